@@ -64,7 +64,8 @@ def settings_of(
             name = f"SIM_GPS1_POS_{axis.upper()}"
             out.append(Setting(name, value.real, value.sigma, "gps_lever_arm"))
     if not recording.derived:
-        for name, (number, sigma) in calibration_settings(recording.diagnosis).items():
+        values = recording.signals.parameters
+        for name, (number, sigma) in calibration_settings(recording.diagnosis, values).items():
             sensor = "accelerometer" if name.startswith("SIM_ACC") else "gyroscope"
             out.append(Setting(name, number, sigma, sensor))
     return tuple(out)

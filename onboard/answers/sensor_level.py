@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final
 
+import numpy as np
+
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.result import Status
+from onboard.core.maths.board_orientation import board_rotation
 from onboard.core.physics.finding import Finding
 from onboard.core.vehicle.limits import APART, SURE
 from onboard.core.vehicle.records import Compared, Difference
@@ -137,10 +140,18 @@ def _only_simulated(effect: Finding) -> Difference:
     return Difference(effect.name, "sensor", values)
 
 
-def calibration_settings(real: Diagnosis) -> dict[str, tuple[float, float]]:
+def calibration_settings(
+    real: Diagnosis, parameters: Mapping[str, float]
+) -> dict[str, tuple[float, float]]:
     """SIM_ACC1_* and SIM_GYR1_*, each with its sigma: the simulator's sensors err as these do.
 
-    Only what is calibrated and differs surely from what the vehicle has in force.
+    Only what is calibrated and differs surely from what the vehicle has in force.  SITL's sensors
+    err in the axes of the body, before SIM_IMU_ORIENT turns them (AP_InertialSensor_SITL): the six
+    numbers, of the sensor's axes, are turned; rates are of the body's.
+
+    Args:
+        real: of the accelerometer.
+        parameters: the autopilot's; AHRS_ORIENTATION says how the sensor's axes lie.
     """
     c = real.calibration
     if c.status is not Status.CALIBRATED or not c.parameters_known:
@@ -148,11 +159,15 @@ def calibration_settings(real: Diagnosis) -> dict[str, tuple[float, float]]:
     out: dict[str, tuple[float, float]] = {}
     # The simulator's gyroscope has the axes of its accelerometer.
     sigma = c.sigma_with_its_gyroscope
+    R_bs = board_rotation(parameters.get("AHRS_ORIENTATION", 0.0))
+    if R_bs is None:
+        return {}
     for i, axis in enumerate("XYZ"):
-        if abs(c.scale[i] - c.in_force_scale[i]) > SCALE_FLOOR + SURE * sigma[i]:
-            out[f"SIM_ACC1_SCAL_{axis}"] = (c.scale[i], float(sigma[i]))
-        if abs(c.offset[i] - c.in_force_offset[i]) > OFFSET_FLOOR + SURE * sigma[3 + i]:
-            out[f"SIM_ACC1_BIAS_{axis}"] = (c.offset[i], float(sigma[3 + i]))
+        j = int(np.argmax(np.abs(R_bs[i])))  # the sensor's axis that lies there
+        if abs(c.scale[j] - c.in_force_scale[j]) > SCALE_FLOOR + SURE * sigma[j]:
+            out[f"SIM_ACC1_SCAL_{axis}"] = (c.scale[j], float(sigma[j]))
+        if abs(c.offset[j] - c.in_force_offset[j]) > OFFSET_FLOOR + SURE * sigma[3 + j]:
+            out[f"SIM_ACC1_BIAS_{axis}"] = (float(R_bs[i, j]) * c.offset[j], float(sigma[3 + j]))
     for axis, gyro in zip("XYZ", c.gyro_scale, strict=True):
         if abs(gyro.value) > SCALE_FLOOR + SURE * gyro.sigma:
             out[f"SIM_GYR1_SCALE_{axis}"] = (PER_CENT * gyro.value, PER_CENT * gyro.sigma)

@@ -57,13 +57,17 @@ class SourceStatistics:
 
 @dataclass(slots=True)
 class CodecStatistics:
-    """What one codec has seen.  ``bad_bytes`` belonged to no valid frame."""
+    """What one codec has seen.  ``bad_bytes`` belonged to no valid frame.
+
+    ``unsigned_beats``: HEARTBEATs of autopilots among those of ``bad_signatures``.
+    """
 
     bytes_received: int = 0
     frames: int = 0
     bad_bytes: int = 0
     bad_frames: int = 0
     bad_signatures: int = 0
+    unsigned_beats: int = 0
     unknown: int = 0
     sent: int = 0
     sources: dict[tuple[int, int], SourceStatistics] = field(default_factory=dict)
@@ -168,6 +172,7 @@ class Codec:
             signing.verify(raw) if signed else signing.accepts_unsigned(message_id)
         ):
             statistics.bad_signatures += 1
+            statistics.unsigned_beats += _is_autopilots_beat(message_id, raw, payload)
             return Frame(raw, -1, system, component, sequence, None)
         message = None
         if self.wanted is None or message_id in self.wanted:
@@ -199,6 +204,14 @@ class Codec:
                 return
             source = statistics.sources[key] = SourceStatistics()
         source.count(frame.sequence)
+
+
+def _is_autopilots_beat(message_id: int, raw: bytes, payload: int) -> bool:
+    """Whether a frame is the HEARTBEAT of an autopilot, as far as its bytes say."""
+    if message_id != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+        return False
+    kind, firmware = raw[payload : payload + raw[1]].ljust(6, b"\0")[4:6]
+    return kind != int(mavlink.MAV_TYPE_GCS) and firmware != int(mavlink.MAV_AUTOPILOT_INVALID)
 
 
 def _is_credible(buffer: bytearray, start: int, length: int, following: framing.NextValid) -> bool:

@@ -36,7 +36,7 @@ from onboard.mavlink.presence import Presence, Whose
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.routes import Routes
 from onboard.mavlink.signing import Signing
-from onboard.mavlink.twins import Twins
+from onboard.mavlink.twins import Twins, our_heartbeat
 from onboard.outage import Over
 
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
@@ -85,6 +85,8 @@ class Link:
         self.twins = Twins(clock)
         self.echoed = 0
         """Our own packets that came back."""
+        self.signed = False
+        """Whether the vehicle's last HEARTBEAT was signed, by whatever key."""
         self._routes = Routes()
         self._signing = signing
         self._recorder = recorder
@@ -124,6 +126,11 @@ class Link:
     def state(self) -> AutopilotState:
         """Whether it is heard now."""
         return self.presence.state
+
+    @property
+    def unsigned_beats(self) -> int:
+        """HEARTBEATs of autopilots that were not believed: they were not signed with our key."""
+        return sum(s.unsigned_beats for c in self.connections for s in c.statistics())
 
     # Who gets what
 
@@ -201,6 +208,8 @@ class Link:
             where = "; ".join(
                 f"{c.endpoint} ({c.last_error or c.state.value})" for c in self.connections
             )
+            if self.unsigned_beats:
+                where += "; heartbeats come that are not signed with our key"
             raise LinkError(f"no heartbeat from an autopilot in {timeout:g} s: {where}") from None
         if self.autopilot is None:
             raise LinkError("the link was closed before an autopilot was heard")
@@ -278,6 +287,8 @@ class Link:
         heard = self.presence.hear(source, way, message, boot, now)
         if heard.whose is Whose.VEHICLE:
             self.connections[way[0]].peers.believe(peer, now)
+            if frame.message_id == _HEARTBEAT:
+                self.signed = framing.header(frame.raw, 0).signed
         for event in heard.events:
             self._tell(event, peer, now)
         if heard.whose is Whose.STANDBY or heard.whose is Whose.FOREIGN:
@@ -346,7 +357,7 @@ class Link:
         if now >= self._next_beat:
             self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
             self.send(
-                _our_heartbeat(self.twins.signature(now))
+                our_heartbeat(self.twins.signature(now))
             )  # over UDP it also tells the peer where we are
         for connection in self.connections:
             connection.check(now)
@@ -378,14 +389,3 @@ class Link:
             self._audience.hear_of(now, ConnectionRestored(endpoint, news))
         else:
             self._audience.hear_of(now, ConnectionTrouble(endpoint, news))
-
-
-def _our_heartbeat(signature: int) -> Message:
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
-        mavlink.MAV_AUTOPILOT_INVALID,
-        0,
-        signature,
-        mavlink.MAV_STATE_ACTIVE,
-        3,
-    )

@@ -143,6 +143,7 @@ class _Exchange:
     set_at: float = 0.0
     saved: bool = False
     denied: bool = False
+    overtaken: bool = False
     seen: float | None = None
     deadline: float | None = None
 
@@ -251,6 +252,9 @@ class ParameterClient:
                 self._out.append(ValueChanged(name, previous, value))
             return
         exchange.seen = value
+        if exchange.sets and exchange.before is not None:
+            # Somebody else has written since we looked, perhaps before us, so that theirs is gone.
+            exchange.overtaken |= value not in {exchange.before, exchange.wanted}
         match exchange.phase:
             case _Phase.READING:
                 self._end(exchange, ValueRead(name, value))
@@ -266,7 +270,9 @@ class ParameterClient:
 
     def _confirmed(self, exchange: _Exchange, value: float, now: float) -> None:
         """A value arrived after a read that was to confirm a set."""
-        if value == exchange.wanted:
+        if value == exchange.wanted and exchange.overtaken:
+            self._end(exchange, SetFailed(exchange.name, Failure.CHANGED_BY_OTHER, value))
+        elif value == exchange.wanted:
             if exchange.saved or exchange.sets >= exchange.attempts:
                 self._end(exchange, SetDone(exchange.name, value, exchange.saved))
             else:  # in force, but not known to be stored: a repeated set is announced again

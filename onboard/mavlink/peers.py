@@ -21,6 +21,10 @@ Address: TypeAlias = tuple[object, ...]
 """As the socket has it: host and port first."""
 
 
+_COUNTED = ("bytes_received", "frames", "bad_bytes", "bad_frames")
+_REFUSED = ("bad_signatures", "unsigned_beats", "unknown")
+
+
 class Merit(IntEnum):
     """What a peer has shown so far."""
 
@@ -186,10 +190,9 @@ class Peers:
 
     def _forget(self, peer: Peer) -> None:
         statistics = peer.codec.statistics
-        for name in ("bytes_received", "frames", "bad_bytes", "bad_frames", "bad_signatures"):
+        for name in _COUNTED + _REFUSED:
             total = getattr(self.gone, name) + getattr(statistics, name)
             setattr(self.gone, name, total)
-        self.gone.unknown += statistics.unknown
 
 
 def _is_claim(frame: Frame) -> bool:

@@ -95,6 +95,11 @@ class Presence:
         """Whether the vehicle has shown a stream."""
         return self._pinned is not None and self._pinned.proven
 
+    @property
+    def chosen(self) -> bool:
+        """Whether somebody has said which system it is to be."""
+        return self._system is not None
+
     def rivals(self, now: float) -> int:
         """How many others claim to be this vehicle, with another clock, these seconds.
 

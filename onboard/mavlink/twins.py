@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 from onboard.mavlink import limits
 from onboard.mavlink.autopilot import TwinHeard
+from onboard.mavlink.dialect import Message, mavlink
 
 NUMBER_BITS = 12
 LONGEST_S = (1 << (32 - NUMBER_BITS)) - 1
@@ -60,3 +61,15 @@ class Twins:
     def first(self, now: float) -> bool:
         """Whether we were there before all others that were heard of late."""
         return self._earlier_at is None or now - self._earlier_at > limits.TWIN_S
+
+
+def our_heartbeat(signature: int) -> Message:
+    """That of an onboard controller, with the signature by which others of our name are told."""
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        0,
+        signature,
+        mavlink.MAV_STATE_ACTIVE,
+        3,
+    )

@@ -101,6 +101,8 @@ class Answers:
         course, progress = self._course, self._course.progress
         reason = WHY_NOT_SET.get(failure, Reason.DENIED)
         sentence = f"{name} was not written: {failure.value}"
+        if reason is Reason.CHANGED_BY_OTHER:
+            sentence = f"somebody else set {name} in the middle"
         if course.state is State.WRITING:
             self.hear(course.trouble(reason, sentence, now), now)
         elif course.state is State.UNDOING:

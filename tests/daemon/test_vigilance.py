@@ -1,5 +1,6 @@
 """What on the wire is not as it should be: told once, and shown while it lasts."""
 
+import asyncio
 import json
 import stat
 
@@ -82,6 +83,36 @@ async def test_a_ground_station_loosens_the_policy_only_where_it_may(
             assert policy() == ("landed" if allowed else "never")
             denied = [n for n in service.snapshot().notices if n.kind == "parameter_denied"]
             assert bool(denied) is not allowed
+
+
+@virtual_time
+@pytest.mark.parametrize("chosen", [False, True])
+async def test_of_two_vehicles_on_one_link_it_is_said_whose_it_is(document, daemon, port, chosen):
+    if chosen:
+        document["link"]["system_id"] = 2
+    with Stranger(port) as other:
+        async with daemon(document) as service, Vehicle(port, system=2):
+            await until(lambda: service.link.presence.proven)
+            for _ in range(20):
+                other.beat(system=1)
+                await asyncio.sleep(0.1)
+            texts = [n.text for n in service.snapshot().notices if n.kind == "another_vehicle"]
+            assert service.link.autopilot.system == 2
+            assert len(texts) == (0 if chosen else 1)
+            assert all("system 1 is" in text and "for system 2" in text for text in texts)
+
+
+@virtual_time
+async def test_a_silence_is_as_long_as_it_was(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.link.presence.proven)
+        vehicle.stop_talking()
+        await asyncio.sleep(21.0)
+        vehicle.talk_again()
+        texts = lambda: [n.text for n in service.snapshot().notices if "are back" in n.text]  # noqa: E731
+        await until(texts)
+        seconds = float(texts()[0].split("after ")[1].split(" s")[0])
+        assert 20.0 <= seconds <= 23.0
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.5, 1.99])

@@ -210,6 +210,15 @@ class TestSet:
         out = client.feed(ValueReceived(NAME, 1.05), 0.3)
         assert out == (SetFailed(NAME, Failure.CHANGED_BY_OTHER, 1.05),)
 
+    def test_somebody_elses_value_that_ours_has_overwritten_is_no_success(self):
+        """They set it between our look and our write, and hear that theirs is in force."""
+        value, client = to_float32(1.1), ParameterClient()
+        client.set(NAME, value, 0.0, before=1.0)
+        client.feed(ValueReceived(NAME, 1.0), 0.1)
+        assert client.feed(ValueReceived(NAME, 1.05), 0.2) == (SendParamRead(NAME),)
+        out = client.feed(ValueReceived(NAME, value), 0.3)
+        assert out == (SetFailed(NAME, Failure.CHANGED_BY_OTHER, value),)
+
     def test_lost_set_is_checked_again_before_it_is_repeated(self):
         client = ParameterClient()
         client.set(NAME, 1.1, 0.0, before=1.0)

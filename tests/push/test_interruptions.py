@@ -4,11 +4,29 @@ import math
 
 import pytest
 
-from onboard.mavlink.parameter_messages import SendAction, SendParamSet
+from onboard.mavlink.parameter_messages import SendAction, SendParamSet, ValueReceived
 from onboard.push import limits
 from onboard.push.entries import Planned, Result, audit
 from onboard.push.signals import Cancelled, LinkLost, Reason, Rebooted, VehicleReport
 from tests.push.pushing import finish, make_plan, when_written
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_what_somebody_sets_between_our_look_and_our_write_is_told(world, number):
+    name, receive = world.plan.names[number], world.autopilot.receive
+    theirs = [ValueReceived(name, 0.875)]
+
+    def overtaken(action, now):
+        if isinstance(action, SendParamSet) and action.name == name and theirs:
+            world.feed(theirs.pop())  # they set it, all heard of it, and then ours came
+        receive(action, now)
+
+    world.autopilot.receive = overtaken
+    outcome = finish(world)
+    assert not theirs
+    assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.CHANGED_BY_OTHER)
+    assert name in outcome.sentence
+    assert world.holds() == world.journal_says() == "old"
 
 
 @pytest.mark.parametrize("count", range(1, 7))

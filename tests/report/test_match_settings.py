@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from onboard.answers.match_settings import settings_of
+from onboard.answers.sensor_level import calibration_settings
+from onboard.core.estimate.result import Estimate, Status
+from onboard.core.maths.board_orientation import board_rotation
 from tests.report.matches_by_hand import by_hand
 
 RECORDING = SimpleNamespace(derived=True)
@@ -21,3 +25,26 @@ def test_a_wind_that_becomes_another_is_no_constant_one(change, handed_back):
     names = {s.name for s in settings_of(vehicle, (), vehicle.effects, RECORDING)}
     assert ("SIM_WIND_SPD" in names) == handed_back
     assert ("SIM_WIND_DIR" in names) == handed_back
+
+
+@pytest.mark.parametrize("orientation", [0, 2, 6, 8, 10, 12, 16, 20, 25, 26])
+def test_the_simulators_accelerometer_errs_as_that_of_a_board_that_is_mounted_turned(orientation):
+    """SITL errs in the body's axes and then turns; ArduPilot corrects in the sensor's."""
+    scale, offset = np.array([1.02, 0.98, 1.015]), np.array([0.2, -0.15, 0.25])
+    calibration = SimpleNamespace(
+        status=Status.CALIBRATED,
+        parameters_known=True,
+        scale=tuple(scale),
+        offset=tuple(offset),
+        in_force_scale=(1.0, 1.0, 1.0),
+        in_force_offset=(0.0, 0.0, 0.0),
+        sigma_with_its_gyroscope=np.full(6, 0.001),
+        gyro_scale=(Estimate(0.0, 0.001),) * 3,
+    )
+    told = {"AHRS_ORIENTATION": float(orientation)}
+    settings = calibration_settings(SimpleNamespace(calibration=calibration), told)
+    R_bs = board_rotation(float(orientation))
+    err_scale, bias = ([settings[f"SIM_ACC1_{n}_{a}"][0] for a in "XYZ"] for n in ("SCAL", "BIAS"))
+    for f_b in np.random.default_rng(1).uniform(-20.0, 20.0, (5, 3)):
+        raw_s = R_bs.T @ (f_b / err_scale + bias)
+        assert R_bs @ ((raw_s - offset) * scale) == pytest.approx(f_b, abs=1e-9)

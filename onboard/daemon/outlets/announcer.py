@@ -74,6 +74,9 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "roll_back_not_stored": Line(WARNING, "{imu} values rolled back are back", "push {imu}"),
         "physics_missing": Line(WARNING, "", "physics"),
         "worth_knowing": Line(INFO, "", "physics"),
+        "seldom": Line(
+            WARNING, "link brings too little to learn from", "seldom", limits.FLAPPING_S
+        ),
         "heartbeats_contradict": Line(WARNING, "two speak as the vehicle, not writing"),
         "rivals": Line(WARNING, "somebody else speaks as the vehicle"),
         "twin": Line(WARNING, "another onboard service is there"),

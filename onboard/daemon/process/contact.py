@@ -58,7 +58,7 @@ class Contact:
             case AutopilotSilent(silence):
                 counters["autopilot_silent"] += 1
                 self._nothing_is_known()
-                if self._silence.lost("no heartbeat", now):
+                if self._silence.lost("no heartbeat", now - silence):
                     post("autopilot_silent", f"no heartbeat for {silence:.0f} s", warning=True)
             case AutopilotReturned():
                 self._nothing_is_known()

@@ -35,3 +35,11 @@ JOURNAL_SHOWN: Final = 50
 """Entries of the journal in a snapshot, the latest ones [tuned]."""
 BEHIND_WORTH_SAYING_S: Final = 5.0
 """s that the learner may lie behind before the line of status says so [tuned]."""
+HEARD_OF_LATE_S: Final = 5.0
+"""s for which something that was heard counts as there [data: five HEARTBEATs]."""
+UNANSWERED_S: Final = 20.0
+"""s without one answer, however often it was asked: the slowest links take some seconds for one
+[data]."""
+SELDOM_S: Final = 30.0
+"""s for which samples come too seldom before it is said: rates are settled in a second or
+two, on a poor link in ten, and asked for again when somebody else has changed them [data]."""

@@ -11,6 +11,7 @@ from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
 from onboard.daemon.process.condition import Observed
+from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.process.signing_file import SigningFile
 from onboard.daemon.process.situation import Situation
 from onboard.daemon.process.vigilance import Vigilance
@@ -83,7 +84,7 @@ class Parts:
         journal = Journal(directory / "journal.jsonl")
         ledger = Ledger(journal, wall_clock)
         proposals = _proposals(configuration, ledger)
-        observed = Observed()
+        observed, traffic = Observed(), Traffic()
         pusher = Pusher(ledger, proposals, witness, notices)
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, wall_clock)
@@ -99,14 +100,21 @@ class Parts:
             streams=Streams(settings.stream_requests(configuration.link.rates)),
             parameters=parameters,
             observed=observed,
-            traffic=Traffic(),
+            traffic=traffic,
             journal=journal,
             witness=witness,
             proposals=proposals,
             pusher=pusher,
             diagnoses=Diagnoses(ledger.append, notices),
             handover=handover,
-            vigilance=Vigilance(link, observed, signing, handover.repetitions, notices),
+            vigilance=Vigilance(
+                link,
+                observed,
+                signing,
+                handover.repetitions,
+                Hindrance(link, parameters, traffic, has_key=signing is not None),
+                notices,
+            ),
         )
 
     def keep_signing(self, margin_s: float = 0.0) -> None:

@@ -17,7 +17,7 @@ from onboard.daemon.view.journal_lines import journal_view
 from onboard.daemon.view.link_health import link_view
 from onboard.daemon.view.numbers import finite_values
 from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
-from onboard.daemon.view.state import INFO, Circumstances, next_step
+from onboard.daemon.view.state import INFO, WARNING, Circumstances, next_step
 from onboard.daemon.view.trust import NO_TRUST
 from onboard.push.policy import VehicleCondition
 
@@ -60,7 +60,7 @@ class Portrait:
             notices=self.parts.notices.kept,
             counters=self._counters(),
             diagnosis=self.parts.diagnoses.document,
-            next_step=next_step(imus) if imus else self._first_step(),
+            next_step=next_step(imus) if imus else self._first_step(now),
         )
 
     def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
@@ -82,8 +82,10 @@ class Portrait:
             for imu, calibration in (learned.calibrations.items() if learned else ())
         )
 
-    def _first_step(self) -> StepView | None:
+    def _first_step(self, now: float) -> StepView | None:
         """What to do while no accelerometer has an answer; None: nothing is known of a vehicle."""
+        if hindered := self.parts.vigilance.hindered(now):
+            return StepView(imu=None, text=hindered, severity=WARNING)
         if self.parts.link.autopilot is None or self.parts.handover.learned is None:
             return None
         return StepView(imu=None, text="fly: standing teaches nothing", severity=INFO)

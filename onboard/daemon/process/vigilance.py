@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from onboard.daemon.process import limits
 from onboard.daemon.process.condition import Observed
+from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.autopilot import AutopilotState
 from onboard.mavlink.link import Link
@@ -25,6 +26,7 @@ class Vigilance:
         observed: the vehicle's condition.
         signing: the key's bookkeeping, None without a key.
         repetitions: samples with one time stamp and different content.
+        hindrance: what keeps us from learning or writing.
         notices: where it is told.
     """
 
@@ -34,17 +36,20 @@ class Vigilance:
         observed: Observed,
         signing: Signing | None,
         repetitions: Repetitions,
+        hindrance: Hindrance,
         notices: Notices,
     ) -> None:
         self._link = link
         self._observed = observed
         self._signing = signing
         self._repetitions = repetitions
+        self._hindrance = hindrance
         self._notices = notices
         self._told: set[str] = set()
 
     def tell(self, now: float) -> None:
         """Say what has begun since the last time."""
+        self._hindrance.look(now)
         found = dict(self._found(now))
         for kind, text in found.items():
             if kind not in self._told:
@@ -55,14 +60,26 @@ class Vigilance:
         """What is so now, one sentence each."""
         return tuple(text for _, text in self._found(now))
 
+    def hindered(self, now: float) -> str:
+        """What keeps anything from being learned or written now, in a sentence; else empty."""
+        return next((text for _, text in self._hindered(now)), "")
+
+    def _hindered(self, now: float) -> Iterator[tuple[str, str]]:
+        if text := self._hindrance.unsigned(now):
+            yield "unsigned_vehicle", text
+        if text := self._hindrance.mute(now):
+            yield "unanswered", text
+        elif text := self._hindrance.seldom(now):
+            yield "seldom", text
+
     def _found(self, now: float) -> Iterator[tuple[str, str]]:
         if self._signing is None and (open_ones := self._open_to_a_network()):
             yield "unsigned_network", f"{open_ones}: {UNSIGNED}"
+        yield from self._hindered(now)
         rivals = self._link.presence.rivals(now)
         if rivals:
             yield "rivals", f"{rivals} more on the link speak as the vehicle; they are not believed"
-        if text := self._another_speaks(now):
-            yield "another_speaks", text
+        yield from self._others(now)
         if self._observed.contradicted(now):
             yield (
                 "heartbeats_contradict",
@@ -80,15 +97,27 @@ class Vigilance:
             )
         yield from self._clocks()
 
-    def _another_speaks(self, now: float) -> str:
+    def _others(self, now: float) -> Iterator[tuple[str, str]]:
         others, autopilot = self._link.presence.others(now), self._link.autopilot
-        if not others or autopilot is None or self._link.state is not AutopilotState.SILENT:
-            return ""
+        if not others or autopilot is None:
+            return
         whose = ", ".join(map(str, others))
-        return (
-            f"system {autopilot.system} is silent, but system {whose} speaks: another vehicle, or "
-            "this one with another id; a restart of the service takes it up"
-        )
+        if self._link.state is AutopilotState.SILENT:
+            yield (
+                "another_speaks",
+                (
+                    f"system {autopilot.system} is silent, but system {whose} speaks: another "
+                    "vehicle, or this one with another id; a restart of the service takes it up"
+                ),
+            )
+        elif not self._link.presence.chosen:
+            yield (
+                "another_vehicle",
+                (
+                    f"system {whose} is an autopilot on this link, too: the service is for system "
+                    f"{autopilot.system}; [link] system_id chooses"
+                ),
+            )
 
     def _clocks(self) -> Iterator[tuple[str, str]]:
         signing = self._signing

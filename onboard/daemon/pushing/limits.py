@@ -19,6 +19,10 @@ ABSENT_S: Final = 300.0
 OPTIONAL_ATTEMPTS: Final = 2
 """Tries of a name that not every firmware has: silence is its usual answer [cost]."""
 
+IN_VAIN: Final = 24
+"""Questions in a row, of names that are there, without one answer: where a third of all frames is
+lost both ways, 0.56 of them are in vain, so many in a row once in a million times [probability]."""
+
 # Proposals
 
 WAIT_AFTER_FAILURE_S: Final = (30.0, 60.0, 120.0, 300.0)

@@ -20,7 +20,13 @@ from onboard.mavlink.parameter_messages import (
     parameter_event,
     parameter_message,
 )
-from onboard.mavlink.parameters import ParameterClient, ReadFailed, ValueChanged, ValueRead
+from onboard.mavlink.parameters import (
+    Failure,
+    ParameterClient,
+    ReadFailed,
+    ValueChanged,
+    ValueRead,
+)
 from onboard.push.policy import context_names
 
 logger = logging.getLogger(__name__)
@@ -71,6 +77,8 @@ class ParameterWatch:
         self._next_read = 0.0
         self._absent: dict[str, float] = {}
         self._answered: set[str] = set()
+        self._asking_since = 0.0
+        self._in_vain = 0
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -92,6 +100,12 @@ class ParameterWatch:
         """Names of the first accelerometer that are needed and not known."""
         return tuple(name for name in FIRST if name not in self.values)
 
+    def unanswered(self, now: float) -> float:
+        """For how long, s, it has been asked in vain: a word that nobody asked for is no answer."""
+        if self._in_vain < limits.IN_VAIN or not self.enabled:
+            return 0.0
+        return now - self._asking_since
+
     def start(self, system: int, component: int, now: float) -> None:
         """Read everything (anew): the autopilot may have rebooted, or be another."""
         if self._target != (system, component):
@@ -100,6 +114,7 @@ class ParameterWatch:
         self._client.cancel()
         self._absent.clear()
         self._answered.clear()
+        self._in_vain = 0
         self._next_read = now
 
     def feed(self, message: Message, now: float) -> Sequence[Message]:
@@ -137,8 +152,11 @@ class ParameterWatch:
             match output:
                 case ValueRead(name):
                     self._answered.add(name)
-                case ReadFailed(name):
+                    self._in_vain = 0
+                case ReadFailed(name, failure):
                     self._answered.add(name)
+                    if failure is not Failure.SILENT:
+                        self._in_vain = 0
                     self.counters["parameters_not_read"] += 1
                     self._absent[name] = now + limits.ABSENT_S
                     if name in FIRST:  # every autopilot that we write to has these: ask again soon
@@ -156,6 +174,10 @@ class ParameterWatch:
                     messages += self._act(self._client.read((name,), now), now)
                 case _ if isinstance(output, SendAction):
                     messages.append(self._encode(output))
+                    # Silence is the usual answer to a name that not every firmware has.
+                    if output.name in FIRST or output.name in self.values:
+                        self._asking_since = self._asking_since if self._in_vain else now
+                        self._in_vain += 1
                 case _:
                     pass
         return messages

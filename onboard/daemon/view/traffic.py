@@ -34,14 +34,15 @@ class Traffic:
             status = asked.get(name)
             rates[name] = MessageRate(
                 count=self._counts.get(name, 0),
-                rate_hz=self._rate(name),
+                rate_hz=self.rate(name),
                 wanted_hz=None if status is None else status.asked,
                 granted_hz=None if status is None else status.granted,
                 stream=None if status is None else status.state.value,
             )
         return rates
 
-    def _rate(self, name: str) -> float:
+    def rate(self, name: str) -> float:
+        """How often a second it came of late, Hz."""
         if len(self._history) < 2:
             return 0.0
         (start, before), (end, after) = self._history[0], self._history[-1]
