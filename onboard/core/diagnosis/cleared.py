@@ -19,7 +19,6 @@ from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
-from onboard.core.filter.shaking import walked
 from onboard.core.inputs.expected_force import drowned, expected, spectrum, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
@@ -124,8 +123,7 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
     That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
     that smooths: a span or an antenna may have been found for the sake of these very samples.
     """
-    walk = walked(full.noise, (b.segment for b in as_read))
-    if spikes.walk**2 < WALK_SHARE * walk.mean():
+    if spikes.walk**2 < WALK_SHARE * full.noise.force_walk**2:
         return False
     plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
     told = []
@@ -193,8 +191,7 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
     if little and not drowned(batches, density):
         return sampled
-    walk = walked(sampled.noise, (b.segment for b in batches))
-    noise = np.minimum(white(density), walk)
+    noise = np.minimum(white(density), sampled.noise.force_walk**2)
     felt = asked.examined(expected(batches, density, noise), sampled)
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 

@@ -26,7 +26,6 @@ from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELOCITY
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.shaking import walked
 from onboard.core.filter.traces import EpochTrace, Traces
 from onboard.core.filter.uncertainty import Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
@@ -87,13 +86,12 @@ def contradictions(
     if not doubted:
         return []
     asked, traces = _coasted(full, levels)
-    walk = float(walked(levels, (b.segment for b in full.batches)).mean())
     spans = [full.point.true_time(np.array([r.start, r.end])) for r in doubted]
     out = []
     for group in _groups([a for a in asked if _within(a.t, spans)]):
         flown = _with_before(group, traces)
         y, S, anchored = _bridged(group, traces)
-        found = _between_steps(flown, levels, walk, anchored=anchored)
+        found = _between_steps(flown, levels, anchored=anchored)
         if not found and anchored:
             found = [*_runs([a.t for a in group], y, S, levels.velocity)]
         out += found
@@ -174,7 +172,7 @@ def _with_before(group: Sequence[Asked], traces: Iterable[EpochTrace]) -> tuple[
 
 
 def _between_steps(
-    flown: tuple[Array, Array], levels: NoiseLevels, walk: float, *, anchored: bool
+    flown: tuple[Array, Array], levels: NoiseLevels, *, anchored: bool
 ) -> list[Contradiction]:
     """Errors that come and go within a second, as the inertia cannot.
 
@@ -183,7 +181,7 @@ def _between_steps(
     where GPS is right again.
     """
     t, y = flown
-    steps, sigma = _steps(t, y, levels, walk)
+    steps, sigma = _steps(t, y, levels)
     error = np.cumsum([np.zeros(2), *(step for _, step in steps)], axis=0)
     if steps and anchored and not _small(error[-1], sigma * np.sqrt(len(steps))):
         n, first = _of_a_second(t), steps[0][0]
@@ -207,9 +205,7 @@ def _small(error: Array, sigma: float) -> bool:
     return size < FAULT_M_S or size**2 < GATE_VELOCITY * sigma**2
 
 
-def _steps(
-    t: Array, y: Array, levels: NoiseLevels, walk: float
-) -> tuple[list[tuple[int, Array]], float]:
+def _steps(t: Array, y: Array, levels: NoiseLevels) -> tuple[list[tuple[int, Array]], float]:
     """Jumps between means over a second to either side: (index, (2,) m/s); and their sigma, m/s.
 
     What goes on growing the second before or after is no jump: that is an inertia that is lost.
@@ -220,7 +216,7 @@ def _steps(
     variance = (
         2.0 * levels.velocity**2 / n
         + 2.0 * levels.velocity_colour**2 * (1.0 - np.exp(-MEAN_S / COLOUR_TIME_S))
-        + walk * MEAN_S
+        + levels.force_walk**2 * MEAN_S
         + (STANDARD_GRAVITY * tilt * MEAN_S) ** 2
     )
     sigma = float(np.sqrt(variance))

@@ -20,7 +20,6 @@ HEADING: Final = "the autopilot's heading is off by more than 30 degrees, as no 
 TILT: Final = "the autopilot's roll and pitch are off by more than a state estimate is that works"
 GYROSCOPE: Final = "the gyroscope errs by more than one that works"
 FORCE: Final = "the accelerometer is noisier than vibration makes one that works"
-SAMPLES: Final = "the force shakes by more than its samples tell"
 WORDS: Final = {
     "velocity": GPS,
     "velocity_colour": GPS,
@@ -28,7 +27,6 @@ WORDS: Final = {
     "height_walk": GPS,
     "jitter": GPS,
     "force_walk": FORCE,
-    "shake": SAMPLES,
     "tilt_walk": GYROSCOPE,
     "bias_walk": GYROSCOPE,
     "attitude": TILT,

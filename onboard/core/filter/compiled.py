@@ -23,8 +23,7 @@ def measured(R_nb: Array, epoch: Epoch, v_down: float, turned: Array) -> Array:
 
 def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     """See :func:`onboard.core.filter.kernel.predict`."""
-    moved, columns = step.moved, step.columns
-    loops.predict(carried, R_nb, step.duration, moved, columns, step.missed, step.shaken, *process)
+    loops.predict(carried, R_nb, step.duration, step.moved, step.columns, step.missed, *process)
 
 
 def whiten(carried: Array, z: Array, reading: Reading, noise: Array) -> Whitening:

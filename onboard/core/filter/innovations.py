@@ -32,7 +32,6 @@ class Step:
         columns: (9, m + 1) stack of what the m unknowns add to velocity, height and attitude;
             nothing is known, column 0 is zero.
         missed: (6,) variances of what the samples miss: of velocity, (m/s)^2, and turn, rad^2.
-        shaken: (3,) integral of the squared distance of the force from its mean, (m/s^2)^2 s.
     """
 
     duration: float
@@ -40,7 +39,6 @@ class Step:
     moved: Array
     columns: Array
     missed: Array
-    shaken: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,15 +50,13 @@ class Steps:
     moved: Array
     columns: Array
     missed: Array
-    shaken: Array
 
     def __len__(self) -> int:
         return len(self.duration)
 
     def __getitem__(self, k: int) -> Step:
         duration = float(self.duration[k])
-        made = self.turn[k], self.moved[k], self.columns[k], self.missed[k], self.shaken[k]
-        return Step(duration, *made)
+        return Step(duration, self.turn[k], self.moved[k], self.columns[k], self.missed[k])
 
 
 def steps(
@@ -73,7 +69,6 @@ def steps(
     columns_to_end: Array,
     columns_turn: Array,
     missed: Array,
-    shaken: Array,
 ) -> Steps:
     """K steps of prediction from their integrals.
 
@@ -87,7 +82,6 @@ def steps(
         columns_to_end: (K, 3, m) as ``force_to_end``.
         columns_turn: (K, 3, m) the turn that they add, rad per unit.
         missed: (K, 6) as in :class:`Step`.
-        shaken: (K, 3) likewise.
     """
     K, _, m = columns.shape
     # What turns at a steady rate meets the force on the mean in proportion to its time left.
@@ -99,7 +93,7 @@ def steps(
     stack[:, 0:3, 1:] = arm @ columns_turn - columns
     stack[:, 3:6, 1:] = columns_to_end
     stack[:, 6:9, 1:] = -columns_turn
-    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed, shaken)
+    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed)
 
 
 @dataclass(frozen=True, slots=True)

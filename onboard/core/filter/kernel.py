@@ -53,7 +53,6 @@ class Process(NamedTuple):
             rate, and what the rate leaves of itself.
         before: (B, STATES) process noise before the transition, unit of the state squared.
         after: (B, STATES) the same after it.
-        shake: (B,) as in :class:`~onboard.core.filter.variances.Variances`.
     """
 
     fall: Array
@@ -61,7 +60,6 @@ class Process(NamedTuple):
     swing: Array
     before: Array
     after: Array
-    shake: Array
 
 
 class Whitening(NamedTuple):
@@ -180,9 +178,8 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     var += process.after
     carried[:, :MEASURED, :m1] += stack_to_ned(R_nb, step.columns)
     carried[:, :MEASURED, 0] += process.fall
-    walked = step.missed[:3] + process.shake[:, None] * step.shaken
-    P[:, 0, V, V] += (R_nb * walked[:, None]) @ R_nb.T
-    if step.missed[3:].any():
+    if step.missed.any():
+        P[:, 0, V, V] += (R_nb * step.missed[:3]) @ R_nb.T
         P[:, 0, PSI, PSI] += (R_nb * step.missed[3:]) @ R_nb.T
     if P.shape[1] > 1:
         P[:, 1:, :3, :3] += step.duration * R_nb.T[:, :, None] * R_nb.T[:, None, :]

@@ -115,7 +115,6 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "heading_walk": (5e-5, 0.03),
     "attitude_white": (3e-5, 0.03),
     "jitter": (3e-4, 0.2),
-    "shake": (1e-3, 1.0),
 }
 """Floors and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
@@ -131,9 +130,6 @@ timing, interpolation and filters are modelled to the last digit.  A gyroscope's
 3e-3 rad/s in a second at the most, where vibration is rectified and changes with the throttle
 [physics]; the jitter of a velocity's moment is at least that of whole milliseconds, and at most the
 time between two fixes, five a second being the fewest that ArduPilot flies with [physics].
-What is not known of a force that shakes is at most as large as it shakes, and the same for no
-longer than the second that its mean is of; a millisecond's square root is nothing beside any walk
-[physics].
 Velocities down are as good as those north and east but for a factor of ten, and a heading that is
 off for longer than ten minutes is off for the flight [physics].
 
@@ -164,13 +160,6 @@ SUDDEN: Final = 4.9
 """Sigmas of the misses of a segment past which a sample is no noise but something sudden
 [probability: 1e-6 of a Gaussian's; what noise is taken for it costs less than a third of its own
 random walk]."""
-
-# How much the force shakes (shaking).
-
-SHAKING_S: Final = 1.0
-"""s; what the force does about its mean of as long is shaking, slower is flying [physics: a few
-samples at the slowest rate that is taken; by what two accelerometers of a board part by, a fifth of
-it and three times as much tell as well or worse on real flights and simulated hovers]."""
 
 # Noise in the regressors (regressor_noise).
 

@@ -123,8 +123,8 @@ def _from_the_right(F: Array, decay: Array, swing: Array, P: Array) -> None:
 
 
 @compiled(
-    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1],"
-    " f8[:,::1], f8[:,::1], f8[:,::1], f8[::1])"
+    "void(f8[:,:,::1], f8[:,:], f8, f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1],"
+    " f8[:,::1], f8[:,::1])"
 )
 def predict(
     carried: Array,
@@ -133,18 +133,16 @@ def predict(
     moved: Array,
     stack: Array,
     missed: Array,
-    shaken: Array,
     fall: Array,
     decay: Array,
     swing: Array,
     before: Array,
     after: Array,
-    shake: Array,
 ) -> None:
     """Carry (B, STATES, C) through one step, in place: F, then process noise and what drives it."""
     members, _, columns = carried.shape
     m1 = stack.shape[1]
-    F, walked = np.zeros((MEASURED, ERRORS)), np.empty(3)
+    F = np.zeros((MEASURED, ERRORS))
     _transition(duration, R_nb, moved, F)
     for b in range(members):
         C = carried[b]
@@ -164,9 +162,7 @@ def predict(
             _from_the_right(F, decay[b], swing[b], C[:, at : at + STATES])
         for i in range(STATES):
             C[i, m1 + i] += after[b, i]
-        for i in range(3):
-            walked[i] = missed[i] + shake[b] * shaken[i]
-        _spread(R_nb, walked, 0, C[0:3, m1 : m1 + 3])
+        _spread(R_nb, missed, 0, C[0:3, m1 : m1 + 3])
         _spread(R_nb, missed, 3, C[4:7, m1 + 4 : m1 + 7])
         _drive(R_nb, stack, C)
         for i in range(MEASURED):

@@ -69,12 +69,10 @@ def carry(
     moved: Array,
     columns: Array,
     missed: Array,
-    shaken: Array,
     latitude: float,
     theta: Array,
     walk: Array,
     settled: Array,
-    shake: Array,
     times: Array,
     heading_time: Array,
     gravity: float,
@@ -110,9 +108,7 @@ def carry(
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
         for i in range(MEASURED - 1):
             after[b, ERRORS + i] += settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
-    predict(
-        carried, R_nb, T, moved, columns, missed, shaken, fall, decay, swing, before, after, shake
-    )
+    predict(carried, R_nb, T, moved, columns, missed, fall, decay, swing, before, after)
     for i in range(3):
         a, b_, c_ = R_nb[i, 0], R_nb[i, 1], R_nb[i, 2]
         for j in range(3):

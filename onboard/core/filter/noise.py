@@ -43,9 +43,6 @@ class NoiseLevels:
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
         jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as
             much of the acceleration (that they err together is left out).
-        shake: velocity random walk from what shakes the vehicle faster than samples tell, along
-            each axis: its variance is ``shake^2`` times the integral of the squared distance of the
-            force from its mean of a second (:mod:`onboard.core.filter.shaking`), sqrt(s).
     """
 
     velocity: float = 0.05
@@ -62,7 +59,6 @@ class NoiseLevels:
     heading_walk: float = 3e-4
     attitude_white: float = 5e-4
     jitter: float = 3e-3
-    shake: float = 0.03
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -97,7 +93,6 @@ ESTIMATED = (
     "heading_walk",
     "attitude_white",
     "jitter",
-    "shake",
 )
 
 NO_VARIANCES = ("vertical", "heading_time")

@@ -7,14 +7,13 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.filter.innovations import Epoch, Steps, WhitenedInnovations
+from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import EAGER_EPOCHS, HEADING_START_RAD, LAZY_EPOCHS, TILT_START_RAD
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import sample_noise_density
-from onboard.core.filter.shaking import walk_of
 from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
 from onboard.core.filter.uncertainty import Covariance, Information, Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
@@ -139,7 +138,7 @@ class Pass:
         self.sums += sums
         block = sums.member(0)
         if self.filter.noise_gram is not None:
-            self._noise_in_regressors(block, segment, ready.steps, self.filter.noise_gram)
+            self._noise_in_regressors(block, segment, self.filter.noise_gram)
         result.block = Block(ready.start, ready.end, block)
         return result
 
@@ -300,20 +299,18 @@ class Pass:
         self.bias_b = self.bias_b + shift
         self.filter.shift_bias(shift)
 
-    def _noise_in_regressors(
-        self, sums: NormalSums, segment: Segment, steps: Steps, gram: Array
-    ) -> None:
+    def _noise_in_regressors(self, sums: NormalSums, segment: Segment, gram: Array) -> None:
         """Expected part of ``N`` that is accelerometer noise in the scale's regressors."""
         if "six" not in self.model.slices:
             return
         # What looks like noise sample by sample may be a tone that integrates to nothing; the
         # velocity's random walk, found from the residuals, is all that it can amount to.
-        most = walk_of(self.filter.bank[0], steps.shaken.sum(axis=0), float(steps.duration.sum()))
-        R2 = (segment.R_bs**2).T
-        density = np.minimum(sample_noise_density(segment.t, segment.raw_s), R2 @ most)
+        density = np.minimum(
+            sample_noise_density(segment.t, segment.raw_s), self.filter.bank[0].force_walk ** 2
+        )
         at = self.model.slices["six"].start
         # The Gram is by body axes; the sensor's are permuted or mixed by R_bs.
-        sensor = R2 @ gram
+        sensor = (segment.R_bs**2).T @ gram
         for j in range(3):
             sums.G[at + j] = density[j] * sensor[j]
 

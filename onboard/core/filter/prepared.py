@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from onboard.core.filter.innovations import Epochs, Steps, steps
 from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S
 from onboard.core.filter.missed import missed_between
-from onboard.core.filter.shaking import shaken_between
 from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -84,12 +83,7 @@ def prepare(
     near = around(maker, epoch_t, point.window, np.array(point.antenna), np.array(point.shapes))
     regressors = model.regressors(intervals, near)
     return Prepared(
-        _steps(
-            intervals,
-            regressors,
-            missed_between(segment, start, end),
-            shaken_between(segment, start, end),
-        ),
+        _steps(intervals, regressors, missed_between(segment, start, end)),
         measured,
         _epochs(segment, fixes, trusted, point, near, regressors),
     )
@@ -108,9 +102,7 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
     return start, end, np.where(last, k + 1, -1)
 
 
-def _steps(
-    intervals: Intervals, regressors: SegmentRegressors, missed: Array, shaken: Array
-) -> Steps:
+def _steps(intervals: Intervals, regressors: SegmentRegressors, missed: Array) -> Steps:
     force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
     return steps(
         intervals.duration,
@@ -122,7 +114,6 @@ def _steps(
         regressors.force2,
         regressors.turn,
         missed,
-        shaken,
     )
 
 

@@ -119,9 +119,9 @@ def _note(
 
 @compiled(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
-    " f8[:,:,::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1],"
-    " f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1],"
-    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
+    " f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1],"
+    " i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1],"
+    " f8[::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -136,7 +136,6 @@ def run(
     moved: Array,
     columns: Array,
     missed: Array,
-    shaken: Array,
     latitude: Array,
     ends: Index,
     offered: Index,
@@ -149,7 +148,6 @@ def run(
     moving: Array,
     walk: Array,
     settled: Array,
-    shake: Array,
     white: Array,
     jitter: Array,
     times: Array,
@@ -175,12 +173,11 @@ def run(
         most: epochs to take.
         symmetry: updates after which covariances are made symmetric.
         theta: (m,) estimate.
-        duration: (K,), turn, moved, columns, missed and shaken as in :class:`~..innovations.Steps`.
+        duration: (K,), turn, moved, columns and missed as in :class:`~..innovations.Steps`.
         turn: see there.
         moved: see there.
         columns: see there.
         missed: see there.
-        shaken: see there.
         latitude: (n,) rad.
         ends: (K,) the epoch at the end of each step; -1: none.
         offered: (n, 4) components of velocity, of height, of attitude over three; what is known of
@@ -193,10 +190,8 @@ def run(
         along: see there.
         noise: see there.
         moving: see there.
-        walk: (B, STATES) and settled, shake, white and jitter as in
-            :class:`~..variances.Variances`.
+        walk: (B, STATES) and settled, white and jitter as in :class:`~..variances.Variances`.
         settled: see there.
-        shake: see there.
         white: see there.
         jitter: see there.
         times: (2,) of the slow errors of velocity and tilt, s.
@@ -230,12 +225,10 @@ def run(
             moved[k],
             columns[k],
             missed[k],
-            shaken[k],
             latitude[max(e, 0)],
             theta,
             walk,
             settled,
-            shake,
             times,
             heading_time,
             gravity,

@@ -38,11 +38,10 @@ class Variances:
             squared.
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
         jitter: (B,) of the moment that a velocity is of, s^2.
-        shake: (B,) share of what the force scatters by that is a walk of the velocity, s.
         heading_time: (B,) time of the heading's smooth error, s.
     """
 
-    __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "shake", "walk")
+    __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "walk")
 
     def __init__(self, bank: Sequence[NoiseLevels], *, attitude: bool) -> None:
         """Take the noise levels of each member, and whether the attitude may err at all."""
@@ -52,7 +51,6 @@ class Variances:
         self.settled = np.zeros((B, MEASURED))
         self.reading = np.zeros((B, MEASURED))
         self.jitter = np.array([q.jitter**2 for q in bank])
-        self.shake = np.array([q.shake**2 for q in bank])
         self.heading_time = np.array([q.heading_time for q in bank])
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2

@@ -198,8 +198,7 @@ class WhiteningFilter:
         decay = np.empty((len(self.bank), MEASURED))
         decay[:] = (cv, cv, cv, 1.0, tilt, tilt, 1.0)
         decay[:, -1], swing = moved(T, self.variances.heading_time)
-        before, after = self.variances.over(T, decay)
-        process = Process(fall, decay, swing, before, after, self.variances.shake)
+        process = Process(fall, decay, swing, *self.variances.over(T, decay))
         self.kernel.predict(self.carried, R, step, process)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R

@@ -26,7 +26,6 @@ from sitl.recording import FlightSpec, fly_messages
 NOISY = GpsTruth(delay=0.04, stamped_early=0.02, velocity_noise=0.15, velocity_coloured=0.15)
 PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 QUIET = NoiseLevels(velocity=0.12, velocity_colour=0.16, force_walk=0.16)
-WALK = QUIET.force_walk**2
 
 
 def complaining(health, complaints):
@@ -110,7 +109,7 @@ NONE, OFF = np.zeros(2), np.array([1.2, -0.9])
 
 def test_an_error_is_what_the_velocity_jumps_by_however_far_the_inertia_has_drifted():
     flown = innovations((5.0, NONE, 0.0), (33.0, OFF, -0.1), (8.0, NONE, -0.1))
-    (found,) = _between_steps(flown, QUIET, WALK, anchored=True)
+    (found,) = _between_steps(flown, QUIET, anchored=True)
     assert (found.start, found.end) == pytest.approx((5.0, 38.0), abs=0.5)
     assert found.off == pytest.approx(OFF, abs=3.0 * found.sigma)
 
@@ -118,7 +117,7 @@ def test_an_error_is_what_the_velocity_jumps_by_however_far_the_inertia_has_drif
 def test_one_that_crept_in_is_counted_back_from_where_gps_is_right_again():
     creeping = [(1.0, 0.1 * k * OFF, 0.0) for k in range(10)]
     flown = innovations(*creeping, (20.0, OFF, 0.0), (8.0, NONE, 0.0))
-    (found,) = _between_steps(flown, QUIET, WALK, anchored=True)
+    (found,) = _between_steps(flown, QUIET, anchored=True)
     assert found.end == pytest.approx(30.0, abs=0.5)
     assert found.size == pytest.approx(1.5, abs=3.0 * found.sigma)
 
@@ -126,7 +125,7 @@ def test_one_that_crept_in_is_counted_back_from_where_gps_is_right_again():
 @pytest.mark.parametrize("drift", [0.3, 2.0, 5.0])
 def test_what_only_grows_is_the_inertias_own(drift):
     flown = innovations((5.0, NONE, 0.0), (20.0, NONE, drift))
-    assert _between_steps(flown, QUIET, WALK, anchored=False) == []
+    assert _between_steps(flown, QUIET, anchored=False) == []
 
 
 def test_the_window_remembers_when_it_refused_and_why():

@@ -55,8 +55,7 @@ def turned(rng):
 def step_of(rng, m):
     shapes = ((3, 3), (3,), (3,), (3, 3), (3, m), (3, m), (3, m))
     integrals = (0.3 * rng.normal(size=(1, *s)) for s in shapes)
-    missed, shaken = (rng.uniform(0.0, 0.1, size=(1, n)) for n in (6, 3))
-    return steps(np.array([0.2]), *integrals, missed, shaken)[0]
+    return steps(np.array([0.2]), *integrals, rng.uniform(0.0, 0.1, size=(1, 6)))[0]
 
 
 def process_of(rng, members):
@@ -65,7 +64,6 @@ def process_of(rng, members):
         rng.uniform(0.5, 1.0, size=(members, MEASURED)),
         rng.uniform(-1.0, 1.0, size=(members, 3)),
         *(rng.uniform(0.0, 0.1, size=(2, members, STATES))),
-        rng.uniform(0.0, 2.0, size=members),
     )
 
 
@@ -111,8 +109,7 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
     P[:, 0] += first
     P = F[:, None] @ P @ np.swapaxes(F, -1, -2)[:, None] + grown
     P[:, 0] += then
-    for b, share in enumerate(process.shake):
-        P[b, 0, :3, :3] += R @ np.diag(step.missed[:3] + share * step.shaken) @ R.T
+    P[:, 0, :3, :3] += R @ np.diag(step.missed[:3]) @ R.T
     P[:, 0, 4:7, 4:7] += R @ np.diag(step.missed[3:]) @ R.T
     X = F @ X
     X[:, :MEASURED] += kernel.stack_to_ned(R, step.columns)

@@ -134,12 +134,7 @@ def test_what_a_fit_leaves_is_chi_square():
         Linearisation(delay=0.0),
         (
             NoiseLevels(
-                velocity=noise,
-                velocity_colour=1e-6,
-                force_walk=1e-6,
-                tilt_walk=1e-9,
-                jitter=1e-9,
-                shake=1e-9,
+                velocity=noise, velocity_colour=1e-6, force_walk=1e-6, tilt_walk=1e-9, jitter=1e-9
             ),
         ),
         uses=PAPER,
@@ -166,15 +161,12 @@ LEVELS = NoiseLevels(
     heading=0.03,
     attitude_white=4e-3,
     jitter=0.02,
-    shake=0.2,
 )
 ACCELERATION = np.array([0.0, 4.0, 0.0])
 """That the moment's jitter is multiplied by; one axis, for the filter takes axes one by one."""
 DT, SUB = 0.01, 10
 BLOW_EVERY, BLOW_SIGMA = 7, np.array([0.2, 0.1, 0.3, 0.02, 0.01, 0.03])
 """Steps; and what their samples miss: m/s and rad, body axes."""
-SHAKEN_EVERY, SHAKEN = 5, np.array([1.0, 0.3, 2.0])
-"""Steps; and what the force scatters by in them: (m/s^2)^2 s, body axes."""
 START_SIGMA = 0.02
 
 
@@ -246,13 +238,11 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
         wander += levels.height_walk * np.sqrt(T) * normal()
         missed = BLOW_SIGMA if k % BLOW_EVERY == 0 else np.zeros(6)
-        shaken = SHAKEN if k % SHAKEN_EVERY == 0 else np.zeros(3)
         v = v + R @ P.T @ (missed[:3] * normal(size=3))
-        v = v + R @ P.T @ (levels.shake * np.sqrt(shaken) * normal(size=3))
         R = R @ P.T @ rotation_from_vector(missed[3:] * normal(size=3)) @ P
         no_turn = np.zeros((3, 1))
-        integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], no_turn)
-        step = steps(np.array([T]), *(x[None] for x in (*integrals, missed**2, shaken)))[0]
+        integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], no_turn, missed**2)
+        step = steps(np.array([T]), *(x[None] for x in integrals))[0]
         filter_.predict(step, theta, 0.0)
         made = filter_.update(epoch((k + 1) * T), theta, Covariance(np.zeros((1, 1))))
         out.append(made.y[0] - made.h[0] @ theta)
