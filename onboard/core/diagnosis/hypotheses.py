@@ -44,10 +44,25 @@ class Choice:
         """Columns of the model that was chosen."""
         return self.base + [i for c in self.chosen for i in c.index]
 
+    def besides(self, taken: Sequence[Candidate]) -> list[Candidate]:
+        """Candidates that may be taken beside some others.
+
+        No simpler form of them is in, and what other accelerometers have seen of a jump is evidence
+        once, whatever it is that jumped.
+        """
+        free = self.base + [i for c in taken for i in c.index]
+        witnessed = any(c.witness is not None for c in taken)
+        return [
+            c
+            for c in self.candidates
+            if c.new_beside(free) and not (witnessed and c.witness is not None)
+        ]
+
     def confounders(self, target: Candidate) -> list[Confounder]:
         """What else could stand in the place of a chosen effect, nearest first."""
-        rest = self.base + [i for c in self.chosen if c is not target for i in c.index]
-        others = [c for c in self.candidates if c not in self.chosen and c.effect != target.effect]
+        kept = [c for c in self.chosen if c is not target]
+        rest = self.base + [i for c in kept for i in c.index]
+        others = [c for c in self.besides(kept) if c is not target and c.effect != target.effect]
         step, wide = _with_best_jump(self, rest)
         if step is None or target.columns is None or not target.columns.tilts_ekf:
             return confounders_of(self.fitter, rest, target, others)
@@ -105,14 +120,7 @@ def choose(
     choice = Choice(fitter, list(base), list(candidates), list(kept))
     while len(choice.chosen) < MOST_EFFECTS:
         step, wide = _with_best_jump(choice, choice.free)
-        # What others have seen of a jump is evidence once.
-        witnessed = any(c.witness is not None for c in choice.chosen)
-        offered = [
-            c
-            for c in choice.candidates
-            if c.new_beside(choice.free) and not (witnessed and c.witness is not None)
-        ]
-        offered += [step] if step is not None else []
+        offered = choice.besides(choice.chosen) + ([step] if step is not None else [])
         offered = _in_question(wide, choice.free, offered)
         before = wide.fit(choice.free)
         best, most = None, least()
@@ -150,8 +158,8 @@ def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bo
     with_it = fitter.fit([*rest, *nuisances.index], held, held_out=False)
     better = max(nuisances.score(fitter, before, with_it), least())
     taken: Candidate | None = None
-    for other in choice.candidates:
-        if not other.new_beside(choice.free) or other.effect == nuisances.effect:
+    for other in choice.besides(choice.chosen):
+        if other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
         score = other.score(fitter, before, after)
@@ -242,8 +250,8 @@ def _reconsider(choice: Choice) -> None:
             choice.chosen.remove(c)
             continue
         better, most = c, c.merit(fitter, before, with_it) + CLEARLY
-        others = [o for o in choice.candidates if o is not c and o.new_beside(rest)]
-        for other in _in_question(fitter, rest, [c, *others]):
+        others = choice.besides([o for o in choice.chosen if o is not c])
+        for other in _in_question(fitter, rest, [c, *(o for o in others if o is not c)]):
             if other is not c:
                 after = fitter.fit([*rest, *other.index])
                 its = other.merit(fitter, before, after)
@@ -264,8 +272,8 @@ def _simplify(choice: Choice) -> None:
         before = fitter.fit(rest)
         better: Candidate | None = None
         most = least()
-        for other in choice.candidates:
-            if not other.new_beside(rest) or other.effect not in c.room_for:
+        for other in choice.besides([o for o in choice.chosen if o is not c]):
+            if other.effect not in c.room_for:
                 continue
             instead = fitter.fit([*rest, *other.index])
             score = other.score(fitter, before, instead)

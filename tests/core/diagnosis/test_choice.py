@@ -9,10 +9,11 @@ import pytest
 
 from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible, smallest
 from onboard.core.diagnosis.effort import MOST_EFFECTS
-from onboard.core.diagnosis.hypotheses import choose, confounders_of
+from onboard.core.diagnosis.hypotheses import choose, confounders_of, reconsider_nuisance
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.estimate.pool import Pool
+from onboard.core.physics.effects.bias_step import Witness
 from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
 
 WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}
@@ -123,6 +124,30 @@ def test_what_has_room_for_another_one_is_taken_if_what_it_adds_matters(seed, mo
     offered = [replace(c, room_for=("a",) if c.effect == "b" else ()) for c in both]
     choice = choose(wide.fitter(), list(range(6)), offered)
     assert {c.effect for c in choice.chosen} == {said}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_others_have_seen_of_a_jump_is_evidence_once(seed):
+    """b is what jumped, e another thing that could have: others have seen one jump, not two.
+
+    Neither beside what jumped, nor in the place of what acts, nor of a nuisance, is e taken.
+    """
+    problem = made(np.random.default_rng(seed), "a", "b", "d")
+    seen = Witness(1000.0, 40, 100.0, np.zeros(3), np.ones(3))
+    offered = [
+        replace(c, jump=True, witness=seen) if c.effect in "be" else c
+        for c in candidates(problem, "abe")
+    ]
+    base = [*range(6), *problem.columns("d")]
+    choice = choose(problem.fitter(), base, offered, offered[:1])
+    assert {c.effect for c in choice.chosen} == {"a", "b"}
+    nuisance = Candidate("d", problem.columns("d"), (5.0,))
+    assert not reconsider_nuisance(choice, nuisance, np.zeros(problem.model.size))
+    assert {c.effect for c in choice.chosen} == {"a", "b"}
+    (a, b) = sorted(choice.chosen, key=lambda c: c.effect)
+    assert choice.besides([a]) == offered[1:]
+    assert choice.besides([b]) == offered[:1]
+    assert choice.confounders(a) == []
 
 
 def test_no_more_than_the_limit_is_taken():
