@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import gc
-import logging
 import os
 from pathlib import Path
 
@@ -41,15 +40,6 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip("no shared recordings beside the project, and ONBOARD_RECORDINGS is not set")
     return folder
-
-
-@pytest.fixture(autouse=True)
-def _loggers_that_speak() -> None:
-    """What other programs' code has silenced in this process, for good, is heard again."""
-    logging.disable(logging.NOTSET)
-    for name, logger in logging.root.manager.loggerDict.items():
-        if name.split(".")[0] == "onboard" and isinstance(logger, logging.Logger):
-            logger.disabled, logger.propagate = False, True
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -107,10 +107,10 @@ def _log(*, verbose: bool) -> None:
     from onboard.daemon.setup.logs import Restrained
 
     stamp = "" if "JOURNAL_STREAM" in os.environ else "%(asctime)s "
+    ours = logging.StreamHandler(sys.stderr)
+    ours.addFilter(Restrained())  # what somebody else has set up to listen hears everything
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO,
         format=f"{stamp}%(levelname)s %(name)s: %(message)s",
-        stream=sys.stderr,
+        handlers=[ours],
     )
-    for handler in logging.getLogger().handlers:
-        handler.addFilter(Restrained())

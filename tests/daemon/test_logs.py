@@ -2,6 +2,9 @@
 
 import logging
 
+import pytest
+
+from onboard.cli.main import run as onboard
 from onboard.daemon.setup.logs import KINDS_MAX, Restrained
 
 
@@ -46,3 +49,16 @@ def test_what_is_remembered_is_bounded():
     for number in range(3 * KINDS_MAX):
         restrained.filter(logging.LogRecord("x", 30, "file.py", number, "text", (), None))
     assert len(restrained._kinds) == KINDS_MAX
+
+
+@pytest.mark.parametrize("there", [[], [Kept()]], ids=["nobody else", "somebody else"])
+def test_the_services_own_lines_are_restrained_and_nobody_elses(tmp_path, monkeypatch, there):
+    """What another program in this process hears would be missing for as long as it runs."""
+    monkeypatch.setattr(logging.getLogger(), "handlers", list(there))
+    file = tmp_path / "vehicle.toml"
+    file.write_text('[http]\ntoken_file = "/nonexistent/token"\n')
+    assert onboard(["run", "--config", str(file), "--state", str(tmp_path / "state")]) == 2
+    handlers = logging.getLogger().handlers
+    assert [h for h in handlers if not h.filters] == there
+    restrained = [h for h in handlers if h not in there]
+    assert [[type(f) for f in h.filters] for h in restrained] == [[Restrained]] * (not there)
