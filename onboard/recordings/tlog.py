@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs import views
+from onboard.core.inputs.views import ASKED, Views
 from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.errors import RecordingError
@@ -226,9 +226,11 @@ def _of_view(data: Bytes, vehicle: _Vehicle) -> tuple[str, ...]:
     octets = np.frombuffer(data, np.uint8)
     told = payloads(octets, headers(octets, vehicle.reports), PARAMETER.itemsize)
     names, values = (told.view(PARAMETER)[name][:, 0] for name in ("id", "value"))
-    asked = np.isin(names, [name.encode() for name in views.ASKED])
-    last = zip(names[asked].astype(str).tolist(), values[asked].tolist(), strict=True)
-    return (OF_VIEW,) if views.tells_views(dict(last), over_mavlink=True) else ()
+    asked = np.isin(names, [name.encode() for name in ASKED])
+    views = Views()
+    for name, value in zip(names[asked].tolist(), values[asked].tolist(), strict=True):
+        views.take(name.decode(), value)
+    return (OF_VIEW,) if views.told else ()
 
 
 def _decoder(source: Source, vehicle: _Vehicle) -> Decoder:

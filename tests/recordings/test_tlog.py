@@ -224,3 +224,6 @@ def test_an_attitude_that_is_not_the_bodys_in_hover_is_said(tmp_path):
     assert notes(*tailsitter, quaternion=True) == ()
     assert notes(*tailsitter, (b"Q_ENABLE", 0.0)) == ()  # the last one counts
     assert notes((b"INS_ACCOFFS_X", 0.25)) == notes() == ()
+    trimmed = ((b"Q_ENABLE", 1.0), (b"PTCH_TRIM_DEG", 3.0))
+    # Numbers that are none say nothing, and end nothing.
+    assert notes(*trimmed, (b"FLIGHT_OPTIONS", math.nan)) == notes(*trimmed) == (note,)
