@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.views import ASKED, Views
 from onboard.core.inputs.blocks import Piece
 from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.core.inputs.views import ASKED, Views
 from onboard.errors import RecordingError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message, mavlink, message_ids
