@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from onboard.answers.flown import FlownRecording
 from onboard.answers.sensor_level import DRIVER_LAG_S, calibration_settings
 from onboard.core.vehicle.effects.wind import FLOOR_M_S
@@ -76,11 +74,9 @@ def _wind_settings(vehicle: VehicleMatch) -> list[Setting]:
     wind = vehicle.wind
     if wind is None:
         return []
-    speed = math.hypot(wind.north, wind.east)
+    speed, sigma = wind.speed, wind.sigma_along
     direction = math.degrees(math.atan2(-wind.east, -wind.north)) % 360.0
-    unit = np.array([wind.north, wind.east]) / max(speed, 1e-9)
-    sigma = float(np.hypot(unit[0] * wind.sigma_north, unit[1] * wind.sigma_east))
-    across = float(np.hypot(unit[1] * wind.sigma_north, unit[0] * wind.sigma_east))
+    turn = math.degrees(wind.sigma_across / max(speed, 1e-9))
     kind = 1.0
     if wind.profile_exponent is not None:
         # The simulator has a square root and a straight line up to 60 m.
@@ -88,7 +84,6 @@ def _wind_settings(vehicle: VehicleMatch) -> list[Setting]:
         power = 0.5 if kind == 0.0 else 1.0
         gain = (TOP_M / min(max(wind.height, 0.5), TOP_M)) ** power
         speed, sigma = speed * gain, sigma * gain
-    turn = math.degrees(across / max(speed, 1e-9))
     return [
         Setting("SIM_WIND_SPD", speed, sigma, "wind"),
         Setting("SIM_WIND_DIR", direction, turn, "wind, where it comes from"),

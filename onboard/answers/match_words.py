@@ -103,14 +103,15 @@ def wind_sentence(match: Match) -> str:
 
 def blown(wind: WindEstimate) -> str:
     """A wind, where it comes from, and how sure that is."""
-    speed = math.hypot(wind.north, wind.east)
+    speed = wind.speed
+    # What a flight does not tell from a calm need not be one, and has no direction to err along.
     sigma = math.hypot(wind.sigma_north, wind.sigma_east)
     if speed < 3.0 * sigma or speed < FLOOR_M_S:
-        # What a flight does not tell from a calm need not be one.
         told = "calm" if 3.0 * sigma < FLOOR_M_S else "perhaps calm"
         return f"{told}: {speed:.2f} ± {sigma:.2f} m/s"
     origin = math.degrees(math.atan2(-wind.east, -wind.north)) % 360.0
-    said = f"{speed:.2f} ± {sigma:.2f} m/s from {origin:.0f}° at a height of {wind.height:.0f} m"
+    said = f"{speed:.2f} ± {wind.sigma_along:.2f} m/s from {origin:.0f}°"
+    said += f" at a height of {wind.height:.0f} m"
     if wind.profile_exponent is not None:
         said += f"; it grows with the height to the power {wind.profile_exponent:.2f}"
     if wind.turbulence_rms is not None:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from markupsafe import Markup
+
 from onboard.answers import match_story as story
 from onboard.answers import words
 from onboard.answers.flown_again import FlownAgain
@@ -116,17 +118,21 @@ def _nothing(match: Match) -> str:
     return "The forces differ, and no effect that is known here explains how."
 
 
-def _hand_back(match: Match, frame_by: str) -> str:
+def _hand_back(match: Match, frame_by: str) -> str | Markup:
     v = match.vehicle
     in_file = {d.name for d in match.effects} & IN_FILE.get(v.vehicle, set())
     count = len(match.settings)
     many = f"the {count} parameters" if count > 1 else "the parameter"
     if count and in_file:
-        return f"Set {many} below in the simulator, and load the frame file ({frame_by})."
+        return Markup(
+            "Set {} below in the simulator, and load the frame file (<code>{}</code>)."
+        ).format(many, frame_by)
     if count:
         return f"Set {many} below in the simulator."
     if in_file:
-        return f"Load the frame file of this match ({frame_by}) into the simulator."
+        return Markup(
+            "Load the frame file of this match (<code>{}</code>) into the simulator."
+        ).format(frame_by)
     if match.effects:
         return "Nothing: the simulator has no setting for what differs."
     return "Nothing."

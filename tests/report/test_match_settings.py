@@ -27,6 +27,24 @@ def test_a_wind_that_becomes_another_is_no_constant_one(change, handed_back):
     assert ("SIM_WIND_DIR" in names) == handed_back
 
 
+def test_a_wind_errs_along_itself_in_speed_and_across_in_direction():
+    """Against draws of its components: the sigma is the speed's and the direction's, not both's."""
+    wind = replace(
+        by_hand().vehicle.wind, north=-4.0, east=3.0, sigma_north=0.02, sigma_east=0.08, change=0.0
+    )
+    drawn = np.random.default_rng(2).normal((wind.north, wind.east), (0.02, 0.08), (40_000, 2))
+    speeds = np.hypot(*drawn.T)
+    turns = np.degrees(np.arctan2(*(-drawn.T)))
+    for exponent, kind, gain in ((None, 1.0, 1.0), (0.5, 0.0, np.sqrt(60.0 / wind.height))):
+        of_air = replace(by_hand().vehicle, wind=replace(wind, profile_exponent=exponent))
+        told = {s.name: s for s in settings_of(of_air, (), of_air.effects, RECORDING)}
+        assert told["SIM_WIND_T"].value == kind
+        assert told["SIM_WIND_SPD"].value == pytest.approx(gain * wind.speed)
+        assert told["SIM_WIND_SPD"].sigma == pytest.approx(gain * speeds.std(), rel=0.02)
+        # A direction is no surer for a wind that is stronger higher up.
+        assert told["SIM_WIND_DIR"].sigma == pytest.approx(turns.std(), rel=0.02)
+
+
 @pytest.mark.parametrize("orientation", [0, 2, 6, 8, 10, 12, 16, 20, 25, 26])
 def test_the_simulators_accelerometer_errs_as_that_of_a_board_that_is_mounted_turned(orientation):
     """SITL errs in the body's axes and then turns; ArduPilot corrects in the sensor's."""

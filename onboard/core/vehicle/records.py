@@ -6,6 +6,7 @@ start; names are the controlled vocabulary of effects.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -76,6 +77,29 @@ class WindEstimate:
     ekf: Array = field(default_factory=lambda: np.zeros((0, 2)))
     law: Array = field(default_factory=lambda: np.zeros((0, 2)))
     change: float = 0.0
+
+    @property
+    def speed(self) -> float:
+        """m/s."""
+        return math.hypot(self.north, self.east)
+
+    @property
+    def sigma_along(self) -> float:
+        """Of the speed, m/s; of a calm that of either component at its largest."""
+        return _sigma(self.north, self.east, self.sigma_north, self.sigma_east)
+
+    @property
+    def sigma_across(self) -> float:
+        """Of what turns it, m/s."""
+        return _sigma(-self.east, self.north, self.sigma_north, self.sigma_east)
+
+
+def _sigma(north: float, east: float, sigma_north: float, sigma_east: float) -> float:
+    """Along a direction, of two components that err each by itself."""
+    length = math.hypot(north, east)
+    if length == 0.0:
+        return max(sigma_north, sigma_east)
+    return math.hypot(north * sigma_north, east * sigma_east) / length
 
 
 @dataclass(frozen=True, slots=True)
