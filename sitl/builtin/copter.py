@@ -135,9 +135,9 @@ def _thrust_frame(down: Array, yaw: Array) -> Array:
     """Frame with z along ``down`` and the given yaw (ZYX)."""
     z = down / np.linalg.norm(down, axis=1)[:, None]
     right = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)])
-    x = np.cross(right, z)
+    x = rotation.crossed(right, z)
     x /= np.linalg.norm(x, axis=1)[:, None]
-    y = np.cross(z, x)
+    y = rotation.crossed(z, x)
     return np.stack([x, y, z], axis=-1)
 
 
