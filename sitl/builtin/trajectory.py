@@ -76,6 +76,14 @@ class Trajectory:
         outputs = None if self.outputs is None else self.outputs.first(n)
         return replace(self, outputs=outputs, **{name: getattr(self, name)[:n] for name in arrays})
 
+    def unwritable(self) -> Trajectory:
+        """Itself, to be shared: who writes to an array gets a ValueError."""
+        for f in fields(self):
+            x = getattr(self, f.name)
+            if isinstance(x, np.ndarray):
+                x.flags.writeable = False
+        return self
+
     @property
     def end(self) -> Start:
         """Where the next piece starts."""
