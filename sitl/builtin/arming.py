@@ -27,7 +27,7 @@ def refusals(
             out.append("3D Accel calibration needed")
             continue
         recent = piece.imus[index].filtered[max(0, row - 500) : row + 1].mean(axis=0)
-        readings.append(corrections.apply(index, recent))
+        readings.append(np.array(corrections.apply(index, recent)))
     threshold = parameters["ARMING_ACCTHRESH"] * np.array([1.0, 1.0, 2.0])
     if any(np.any(np.abs(f - readings[0]) > threshold) for f in readings[1:]):
         out.append("Accels inconsistent")

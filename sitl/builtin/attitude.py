@@ -9,6 +9,9 @@ the autopilot believes in.  Process noise and initial uncertainty are EKF3's def
 
 from __future__ import annotations
 
+from copy import deepcopy
+from functools import lru_cache
+
 import numpy as np
 
 from sitl.builtin import rotation
@@ -36,6 +39,12 @@ SMOOTHING = 0.25
 
 PHI, VEL, POS, BG, BA = (slice(i, i + 3) for i in range(0, 15, 3))
 _INITIAL_SIGMA = np.repeat([0.1, 0.3, 0.5, 0.005, 0.2], 3)
+_GPS = slice(3, 9)
+_GPS_SIGMA = np.array(
+    [VELOCITY_SIGMA] * 2 + [HEIGHT_VELOCITY_SIGMA] + [POSITION_SIGMA] * 2 + [HEIGHT_SIGMA]
+)
+_GPS_NOISE = np.diag(_GPS_SIGMA**2)
+_HEADING = 2
 FUSE_EVERY = 5
 """Steps from fix to fix, while it stands."""
 STOOD_STEPS = 1500
@@ -75,24 +84,28 @@ class AttitudeFilter:
         return self._error[POS]
 
     def align(self, R_nb: Array, f_error_b: Array, heading_error: float) -> None:
-        """Levels with the accelerometer at rest: its horizontal error becomes tilt."""
+        """Levels a fresh filter with the accelerometer at rest: its horizontal error becomes tilt.
+
+        Then it stands, and learns of its biases before it flies.
+        """
+        stood = _stood(R_nb.tobytes(), f_error_b.tobytes(), heading_error)
+        self.__dict__.update(deepcopy(stood.__dict__))
+
+    def level(self, R_nb: Array, f_error_b: Array, heading_error: float) -> None:
+        """Takes the errors at rest for its own; see :meth:`align`."""
         f_error_n = R_nb @ f_error_b
         self._error[PHI] = (
             -f_error_n[1] / STANDARD_GRAVITY,
             f_error_n[0] / STANDARD_GRAVITY,
             heading_error,
         )
-        self._stand(R_nb, f_error_b, heading_error)
-        self.phi = self._error[PHI].copy()
-
-    def _stand(self, R_nb: Array, f_error_b: Array, heading_error: float) -> None:
-        """What it learns of its biases before it flies."""
-        gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+        zero, gravity = np.zeros(3), np.array([0.0, 0.0, -STANDARD_GRAVITY])
         for k in range(STOOD_STEPS):
-            self.predict(R_nb, gravity, f_error_b, np.zeros(3))
+            self.predict(R_nb, gravity, f_error_b, zero)
             if k % FUSE_EVERY == 0:
-                self.fuse_gps(np.zeros(3), np.zeros(3))
+                self.fuse_gps(zero, zero)
                 self.fuse_heading(heading_error)
+        self.phi = self._error[PHI].copy()
 
     def predict(self, R_nb: Array, f_n: Array, f_error_b: Array, w_error_b: Array) -> None:
         """One step of ``STEP`` seconds.
@@ -110,8 +123,9 @@ class AttitudeFilter:
         x[VEL] += STEP * pushed
         x[PHI] += STEP * turned
         F = self._transition
-        fx, fy, fz = STEP * f_n
-        F[VEL, PHI] = ((0.0, fz, -fy), (-fz, 0.0, fx), (fy, -fx, 0.0))
+        fx, fy, fz = (STEP * f_n).tolist()
+        F[3, 1], F[3, 2], F[4, 0] = fz, -fy, -fz
+        F[4, 2], F[5, 0], F[5, 1] = fx, fy, -fx
         F[PHI, BG] = F[VEL, BA] = -STEP * R_nb
         self.covariance = F @ self.covariance @ F.T + self._noise
         self.phi = self.phi + STEP * turned
@@ -124,35 +138,38 @@ class AttitudeFilter:
             Whether it passed the gate.
         """
         innovation = np.concatenate([velocity_n - self._error[VEL], position_n - self._error[POS]])
-        sigma = np.array([VELOCITY_SIGMA] * 2 + [HEIGHT_VELOCITY_SIGMA] + [POSITION_SIGMA] * 3)
-        sigma[5] = HEIGHT_SIGMA
-        spread = np.sqrt(np.diag(self.covariance)[3:9] + sigma**2)
-        self.ratios[0] = float(np.max(np.abs(innovation[:3]) / spread[:3]) / GATE)
-        self.ratios[1] = float(np.max(np.abs(innovation[3:5]) / spread[3:5]) / GATE)
-        self.ratios[2] = float(abs(innovation[5]) / spread[5] / GATE)
+        spread = np.sqrt(self.covariance.diagonal()[_GPS] + _GPS_SIGMA**2)
+        off = (np.abs(innovation) / spread).tolist()
+        self.ratios[:3] = max(off[:3]) / GATE, max(off[3:5]) / GATE, off[5] / GATE
         if max(self.ratios[:2]) > 1.0 and self._rejected < 50:
             self._rejected += 1
             return False
         self._rejected = 0
-        H = np.zeros((6, 15))
-        H[:, 3:9] = np.eye(6)
-        self._correct(H, innovation, np.diag(sigma**2))
+        read = self.covariance[:, _GPS].copy()
+        self._correct(np.linalg.solve(read[_GPS] + _GPS_NOISE, read.T).T, read, innovation)
         return True
 
     def fuse_heading(self, error: float) -> None:
         """Fuses a magnetic heading whose error is ``error`` (rad)."""
-        H = np.zeros((1, 15))
-        H[0, 2] = 1.0
-        innovation = np.array([error - self._error[2]])
+        innovation = error - self._error[_HEADING : _HEADING + 1]
         self.ratios[3] = float(abs(innovation[0]) / (HEADING_SIGMA * GATE))
-        self._correct(H, innovation, np.array([[HEADING_SIGMA**2]]))
+        read = self.covariance[:, _HEADING : _HEADING + 1].copy()
+        gain = read * (1.0 / (read[_HEADING, 0] + HEADING_SIGMA**2))
+        self._correct(gain, read, innovation)
 
-    def _correct(self, H: Array, innovation: Array, noise: Array) -> None:
-        PHt = self.covariance @ H.T
-        gain = np.linalg.solve(H @ PHt + noise, PHt.T).T
+    def _correct(self, gain: Array, read: Array, innovation: Array) -> None:
+        """Takes an innovation (n,) with a gain (15, n); ``read`` (15, n): P H^T."""
         change = gain @ innovation
         self._error += change[:9]
         self.gyro_bias = self.gyro_bias + change[BG]
-        self.accel_bias = np.clip(self.accel_bias + change[BA], -1.0, 1.0)
-        P = self.covariance - gain @ PHt.T
+        self.accel_bias = np.minimum(np.maximum(self.accel_bias + change[BA], -1.0), 1.0)
+        P = self.covariance - gain @ read.T
         self.covariance = 0.5 * (P + P.T)
+
+
+@lru_cache(maxsize=16)
+def _stood(R_nb: bytes, f_error_b: bytes, heading_error: float) -> AttitudeFilter:
+    """A filter that has stood: a vehicle that boots again and again stands alike, for 50 ms."""
+    made = AttitudeFilter()
+    made.level(np.frombuffer(R_nb).reshape(3, 3), np.frombuffer(f_error_b), heading_error)
+    return made

@@ -107,12 +107,13 @@ def _body(
     mean = 0.5 * sum(flight.drag)
     unequal = np.array([flight.drag[0] - mean, flight.drag[1] - mean, 0.0])
     along = f_n + (mean + flight.drag_quadratic * airspeed)[:, None] * air_n
-    R = _thrust_frame(-along, yaw)
+    right = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)])
+    R = _thrust_frame(-along, right)
     # Only the difference between drag along x and y has no closed form; each round leaves
     # a few per cent of what the one before left.
     for _ in range(3):
         remainder = unequal * rotation.rotate_back(R, air_n)
-        R = _thrust_frame(-(along + rotation.rotate(R, remainder)), yaw)
+        R = _thrust_frame(-(along + rotation.rotate(R, remainder)), right)
     f_b = rotation.rotate_back(R, f_n)
     t = np.arange(n) / RATE
     thrust = np.clip(-f_b[:, 2] / trajectory.STANDARD_GRAVITY, 0.0, None)
@@ -131,14 +132,14 @@ def _body(
     )
 
 
-def _thrust_frame(down: Array, yaw: Array) -> Array:
-    """Frame with z along ``down`` and the given yaw (ZYX)."""
+def _thrust_frame(down: Array, right: Array) -> Array:
+    """Frame with z along ``down`` and the yaw (ZYX) of which ``right`` is to the right, level."""
     z = down / np.linalg.norm(down, axis=1)[:, None]
-    right = np.column_stack([-np.sin(yaw), np.cos(yaw), np.zeros_like(yaw)])
-    x = np.cross(right, z)
+    x = rotation.crossed(right, z)
     x /= np.linalg.norm(x, axis=1)[:, None]
-    y = np.cross(z, x)
-    return np.stack([x, y, z], axis=-1)
+    R = np.empty((len(z), 3, 3))
+    R[:, :, 0], R[:, :, 1], R[:, :, 2] = x, rotation.crossed(z, x), z
+    return R
 
 
 def _plan(flight: CopterFlight, start: Start) -> _Plan:

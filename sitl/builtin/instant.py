@@ -21,26 +21,34 @@ ACCEL_STEMS = ("INS_ACC", "INS_ACC2", "INS_ACC3")
 
 
 class Corrections:
-    """ArduPilot's ``f_b = R_bs diag(SCAL) (raw - OFFS)`` for every IMU, as one affine map each."""
+    """ArduPilot's ``f_b = R_bs diag(SCAL) (raw - OFFS)`` for every IMU.
+
+    Boards sit at right angles: each body axis is one of the sensor's, or against it.
+    """
 
     def __init__(self, parameters: ParameterStore, imus: int) -> None:
         R_bs = board_rotation(int(parameters["AHRS_ORIENTATION"]))
-        self.matrix = []
-        self.offset = []
+        along = np.argmax(np.abs(R_bs), axis=1).tolist()
+        self._axes: list[list[tuple[int, float, float]]] = []
         for stem in ACCEL_STEMS[:imus]:
-            self.matrix.append(R_bs * np.array(parameters.vector(stem + "SCAL_")))
-            self.offset.append(np.array(parameters.vector(stem + "OFFS_")))
+            scale, offset = parameters.vector(stem + "SCAL_"), parameters.vector(stem + "OFFS_")
+            self._axes.append(
+                [(j, float(R_bs[i, j]) * scale[j], offset[j]) for i, j in enumerate(along)]
+            )
         self.trim = np.array(parameters.vector("AHRS_TRIM_"))
 
-    def apply(self, imu: int, raw: Array) -> Array:
+    def apply(self, imu: int, raw: Array) -> list[float]:
         """Raw sensor reading (3,) of IMU ``imu`` (from 0) to body axes, m/s^2."""
-        out: Array = self.matrix[imu] @ (raw - self.offset[imu])
-        return out
+        read = raw.tolist()
+        return [by * (read[j] - off) + 0.0 for j, by, off in self._axes[imu]]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Instant:
-    """A moment at which messages are sent; ``t_sample`` is the last sample the sensors gave."""
+    """A moment at which messages are sent; ``t_sample`` is the last sample the sensors gave.
+
+    It is not written to; to freeze it would take three times as long, every few milliseconds.
+    """
 
     t: float
     t_sample: float
@@ -88,7 +96,7 @@ class Instant:
         """Number of IMUs."""
         return len(self.piece.imus)
 
-    def accel(self, imu: int) -> Array:
+    def accel(self, imu: int) -> list[float]:
         """Corrected, filtered accelerometer, body, m/s^2."""
         return self.corrections.apply(imu, self.piece.imus[imu].filtered[self.row])
 

@@ -104,9 +104,12 @@ class Links:
     @property
     def next_due(self) -> float:
         """Earliest boot time at which something is to be sent, ms; at once while a list goes."""
-        if any(link.listing is not None for link in self._links):
-            return -math.inf
-        return min((link.schedule.next_due for link in self._links), default=math.inf)
+        due = math.inf  # asked in every loop: no generators
+        for link in self._links:
+            if link.listing is not None:
+                return -math.inf
+            due = min(due, link.schedule.next_due)
+        return due
 
     def send_due(self, instant: Callable[[], Instant], period: float) -> None:
         """What is due in this main loop.

@@ -22,7 +22,7 @@ Message: TypeAlias = Any
 """A pymavlink message; the dialect has no types."""
 
 MILLI_G = 1000.0 / STANDARD_GRAVITY
-EARTH_FIELD_MG = (240.0, 30.0, -510.0)
+EARTH_FIELD_MG = np.array([240.0, 30.0, -510.0])
 UNKNOWN_16 = 65535
 AUTOPILOT_CUSTOM = 1
 ARMED = 128
@@ -38,17 +38,17 @@ def packed(message: Message, packer: Message) -> bytes:
 
 def truncated(x: float) -> int:
     """A C cast of float to int16: toward zero."""
-    return max(-32768, min(32767, int(x)))
+    whole = int(x)
+    return whole if -32768 <= whole <= 32767 else max(-32768, min(32767, whole))
 
 
-def _f(x: float) -> float:
-    return as_float32(x)
+_f = as_float32
 
 
 def _inertial(now: Instant, imu: int) -> list[int]:
     """Nine int16: milli-g, milli-rad/s, milli-gauss."""
-    accel, gyro = now.accel(imu).tolist(), now.gyro(imu).tolist()
-    field = (np.array(EARTH_FIELD_MG) @ now.piece.trajectory.R_nb[now.row]).tolist()
+    accel, gyro = now.accel(imu), now.gyro(imu).tolist()
+    field = (EARTH_FIELD_MG @ now.piece.trajectory.R_nb[now.row]).tolist()
     return (
         [truncated(x * MILLI_G) for x in accel]
         + [truncated(x * 1000.0) for x in gyro]
@@ -86,7 +86,7 @@ def highres_imu(now: Instant) -> Message:
     altitude = now.barometer.altitude(_true_altitude(now))
     pressure = now.barometer.pressure(altitude) * 0.01
     ground = now.barometer.pressure(now.world.environment.altitude) * 0.01
-    field = np.array(EARTH_FIELD_MG) @ now.piece.trajectory.R_nb[now.row] * 1000.0
+    field = EARTH_FIELD_MG @ now.piece.trajectory.R_nb[now.row] * 1000.0
     return mav.MAVLink_highres_imu_message(
         now.microseconds,
         *(_f(x) for x in now.accel(0)),
@@ -103,8 +103,8 @@ def highres_imu(now: Instant) -> Message:
 
 def attitude(now: Instant) -> Message:
     """ATTITUDE: the estimate less AHRS_TRIM, rates without their estimated bias."""
-    roll, pitch, yaw = now.attitude()
-    rates = now.gyro(0) - now.ahrs.gyro_bias
+    roll, pitch, yaw = now.attitude().tolist()
+    rates = (now.gyro(0) - now.ahrs.gyro_bias).tolist()
     return mav.MAVLink_attitude_message(
         now.milliseconds, _f(roll), _f(pitch), _f(yaw), *(_f(x) for x in rates)
     )

@@ -85,7 +85,7 @@ def rotate_back(R: Array, v: Array) -> Array:
 
 def one_from_vector(v: Array) -> Array:
     """:func:`from_vector` of a single vector (3,), quick: called for every message."""
-    x, y, z = (float(c) for c in v)
+    x, y, z = v.tolist()
     angle = math.sqrt(x * x + y * y + z * z)
     if angle < 1e-8:
         a, b = 1.0, 0.5
@@ -102,13 +102,23 @@ def one_from_vector(v: Array) -> Array:
 
 def one_to_euler(R_nb: Array) -> Array:
     """:func:`to_euler` of a single matrix."""
-    roll = math.atan2(R_nb[2, 1], R_nb[2, 2])
-    pitch = -math.asin(min(1.0, max(-1.0, R_nb[2, 0])))
-    return np.array([roll, pitch, math.atan2(R_nb[1, 0], R_nb[0, 0])])
+    (xx, _, _), (yx, _, _), (zx, zy, zz) = R_nb.tolist()
+    pitch = -math.asin(min(1.0, max(-1.0, zx)))
+    return np.array([math.atan2(zy, zz), pitch, math.atan2(yx, xx)])
+
+
+def crossed(a: Array, b: Array) -> Array:
+    """Cross products (n, 3), sample by sample; numpy's own takes four times as long."""
+    out = np.empty_like(a)
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    out[:, 0] = ay * bz - az * by
+    out[:, 1] = az * bx - ax * bz
+    out[:, 2] = ax * by - ay * bx
+    return out
 
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product of two single vectors; numpy's own is made for large arrays."""
-    ax, ay, az = a
-    bx, by, bz = b
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

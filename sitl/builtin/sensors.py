@@ -259,7 +259,7 @@ def _gyro(
     noise = white.standard_normal((n, 3)) * (imu.gyro_noise * np.sqrt(RATE / 2.0))
     walk = np.cumsum(wander.standard_normal((n, 3)), axis=0) * (imu.gyro_walk * np.sqrt(DT))
     drift = np.outer(np.sin(2.0 * np.pi * t / 600.0), imu.gyro_bias)
-    felt = w_b + np.cross(w_b, imu.gyro_turn)
+    felt = w_b + np.cross(w_b, imu.gyro_turn) if any(imu.gyro_turn) else w_b
     out: Array = felt * (1.0 + np.array(imu.gyro_scale)) + noise + walk + drift
     return out
 

@@ -20,6 +20,7 @@ from sitl.builtin.autopilot import Autopilot
 from sitl.builtin.impairment import Impairment
 from sitl.builtin.links import Link
 from sitl.builtin.messages import Message, packed
+from sitl.virtual_time import VirtualTimeLoop
 
 TICK = 0.005
 """Wall-clock seconds between steps of the simulation."""
@@ -146,8 +147,11 @@ class Server:
                 self._admit()
                 self._listen()
                 self._speak()  # answers leave at once, whatever is then to be computed
-                # A thread: generating a flight takes a second, and the sockets must not wait.
-                await asyncio.to_thread(self.autopilot.advance, elapsed * self.speedup)
+                if isinstance(loop, VirtualTimeLoop):
+                    self.autopilot.advance(elapsed * self.speedup)  # its clock waits meanwhile
+                else:
+                    # A thread: generating a flight takes a second, and the sockets must not wait.
+                    await asyncio.to_thread(self.autopilot.advance, elapsed * self.speedup)
                 self._speak()
         finally:
             for close in self._closers:

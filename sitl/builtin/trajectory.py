@@ -76,6 +76,14 @@ class Trajectory:
         outputs = None if self.outputs is None else self.outputs.first(n)
         return replace(self, outputs=outputs, **{name: getattr(self, name)[:n] for name in arrays})
 
+    def unwritable(self) -> Trajectory:
+        """Itself, to be shared: who writes to an array gets a ValueError."""
+        for f in fields(self):
+            x = getattr(self, f.name)
+            if isinstance(x, np.ndarray):
+                x.flags.writeable = False
+        return self
+
     @property
     def end(self) -> Start:
         """Where the next piece starts."""
@@ -103,21 +111,22 @@ def transport_rate_n(v_n: Array, environment: Environment) -> Array:
 def specific_force_n(v_n: Array, environment: Environment) -> Array:
     """``f_n = dv/dt + (2 w_ie + w_en) x v - g`` (Groves 2013, eq. 5.53), (n, 3) m/s^2."""
     turning = 2.0 * earth_rate_n(environment) + transport_rate_n(v_n, environment)
-    f_n = derivative(v_n) + np.cross(turning, v_n)
+    f_n = derivative(v_n) + rotation.crossed(turning, v_n)
     f_n[:, 2] -= environment.gravity
     return f_n
 
 
 def body_rate(R_nb: Array, v_n: Array, environment: Environment) -> Array:
     """Angular rate against inertial space from ``R^T dR/dt`` and the earth's, (n, 3) rad/s."""
-    omega = np.einsum("nji,njk->nik", R_nb, derivative(R_nb))
-    w_b = 0.5 * np.stack(
-        [
-            omega[:, 2, 1] - omega[:, 1, 2],
-            omega[:, 0, 2] - omega[:, 2, 0],
-            omega[:, 1, 0] - omega[:, 0, 1],
-        ],
-        axis=-1,
+    R = np.ascontiguousarray(np.moveaxis(R_nb, 0, -1))  # element by element: quick to go through
+    dR = [[derivative(x) for x in row] for row in R]
+
+    def omega(i: int, k: int) -> Array:
+        out: Array = R[0, i] * dR[0][k] + R[1, i] * dR[1][k] + R[2, i] * dR[2][k]
+        return out
+
+    w_b = 0.5 * np.column_stack(
+        [omega(2, 1) - omega(1, 2), omega(0, 2) - omega(2, 0), omega(1, 0) - omega(0, 1)]
     )
     carried = earth_rate_n(environment) + transport_rate_n(v_n, environment)
     return w_b + rotation.rotate_back(R_nb, carried)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 from sitl.builtin import effects as fx
@@ -200,8 +201,8 @@ class World:
                 stop_at=flight.stop_at,
             )
         if isinstance(flight, PlaneFlight):
-            return plane_trajectory(flight, self.environment, start)
-        return copter_trajectory(flight, self.environment, start)
+            return _plane(flight, self.environment, start)
+        return _copter(flight, self.environment, start)
 
     def _append(self, trajectory: Trajectory, flight: PlaneFlight | CopterFlight | None) -> None:
         start = self.end
@@ -229,6 +230,17 @@ class World:
             )
             for index in range(len(self.truth.imus))
         )
+
+
+# A motion does not depend on the sensors: the last one is often flown again with others.
+@lru_cache(maxsize=1)
+def _plane(flight: PlaneFlight, environment: Environment, start: Start) -> Trajectory:
+    return plane_trajectory(flight, environment, start).unwritable()
+
+
+@lru_cache(maxsize=1)
+def _copter(flight: CopterFlight, environment: Environment, start: Start) -> Trajectory:
+    return copter_trajectory(flight, environment, start).unwritable()
 
 
 def _blocks(trajectory: Trajectory, imu: ImuReadings, board: Array) -> Blocks:

@@ -1,6 +1,7 @@
 """A jump of one accelerometer of several is said of that one; of none if nothing tells."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -20,11 +21,24 @@ AT = 61.3
 SPEC = FlightSpec(vehicle="copter", seed=23, duration=130.0, imus=random_imus(23, 3))
 
 
-def judged(imus: int, asked: int, at: float = AT, **step) -> Judge:
+@functools.cache
+def flown(imus: int, step: concealed.BiasStep) -> Calibrator:
+    """What has listened to a flight of a vehicle of several; each is asked of each."""
+    return heard(dataclasses.replace(SPEC, imus=SPEC.imus[:imus], effects=(step,)))
+
+
+@functools.cache
+def judged(imus: int, asked: int, *, at: float, **step) -> Judge:
     """One accelerometer of a vehicle of several, ``step`` concealed."""
-    effect = concealed.BiasStep(time=at, **step)
-    spec = dataclasses.replace(SPEC, imus=SPEC.imus[:imus], effects=(effect,))
-    return examine(heard(spec), asked)
+    return examine(flown(imus, concealed.BiasStep(time=at, **step)), asked)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forgotten():
+    """Flights are long: they go when they have been asked."""
+    yield
+    judged.cache_clear()
+    flown.cache_clear()
 
 
 def offsets(judge: Judge):
@@ -37,7 +51,7 @@ def offsets(judge: Judge):
 @pytest.mark.slow
 def test_of_three_a_small_jump_is_said_of_the_one_that_made_it():
     """5 cm/s^2: GPS alone shows it at the edge, the others without doubt."""
-    asked = {imu: judged(3, imu, imu=2, x=0.05, y=-0.04) for imu in (1, 2)}
+    asked = {imu: judged(3, imu, at=AT, imu=2, x=0.05, y=-0.04) for imu in (1, 2)}
     said = {imu: judge.diagnosis() for imu, judge in asked.items()}
     assert "bias_step" not in {e.name for e in said[1].effects}
     (jump,) = (e for e in said[2].effects if e.name == "bias_step")
@@ -55,7 +69,7 @@ def test_of_three_the_moment_is_told_by_the_second_in_which_they_are_compared():
     """Half a second where it is in a window, a little more where it is between two of them."""
     sigmas = []
     for at in (AT - 1.05, AT - 0.8, AT):
-        judge = judged(3, 2, at, imu=2, x=0.05, y=-0.04)
+        judge = judged(3, 2, at=at, imu=2, x=0.05, y=-0.04)
         (jump,) = (e for e in judge.diagnosis().effects if e.name == "bias_step")
         time = jump.unknowns["time"]
         assert time.value + judge.final.origin.t0 == pytest.approx(at, abs=3.0 * time.sigma)
@@ -68,7 +82,7 @@ def test_of_three_the_moment_is_told_by_the_second_in_which_they_are_compared():
 @pytest.mark.parametrize("imu", [1, 2])
 def test_of_two_nothing_is_said_wrongly_and_sigmas_hold(imu):
     """Whoever is asked: the jump is its own, the other's, or nobody's and in the sigmas."""
-    judge = judged(2, imu, imu=2, x=0.1)
+    judge = judged(2, imu, at=AT, imu=2, x=0.1)
     named = {e.name for e in judge.diagnosis().effects}
     assert "bias_step" not in named or imu == 2
     off, sigma = offsets(judge)
@@ -80,7 +94,7 @@ def test_of_two_nothing_is_said_wrongly_and_sigmas_hold(imu):
 
 @pytest.mark.slow
 def test_what_all_do_alike_is_said_to_be_common():
-    diagnosis = judged(2, 1, imu=0, x=0.2, z=0.15).diagnosis()
+    diagnosis = judged(2, 1, at=AT, imu=0, x=0.2, z=0.15).diagnosis()
     (jump,) = (e for e in diagnosis.effects if e.name == "bias_step")
     assert "what all accelerometers share" in jump.cure
     assert "all accelerometers ask for the same jump" in diagnosis.note

@@ -1,6 +1,6 @@
 """A receiver's faults are named, counted, and leave the answer within its limits."""
 
-from functools import reduce
+import functools
 
 import numpy as np
 import pytest
@@ -40,12 +40,24 @@ LENGTH_S = {"copter": 300.0, "plane": 240.0}
 SEED = {"copter": 16, "plane": 17}
 
 
-@pytest.fixture(scope="module", params=LENGTH_S)
-def flight(request):
-    vehicle = request.param
+@functools.cache
+def flown(vehicle):
+    """For a module pytest flies it once a set of parameters, though it is the same in two."""
     seed, length = SEED[vehicle], LENGTH_S[vehicle]
     imus = random_imus(seed)
     return simulated(FlightSpec(vehicle=vehicle, seed=seed, duration=length, imus=imus))
+
+
+@pytest.fixture(scope="module", params=LENGTH_S)
+def flight(request):
+    return flown(request.param)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forgotten():
+    """Flights are long: they go when they have been asked."""
+    yield
+    flown.cache_clear()
 
 
 @pytest.mark.slow
@@ -63,7 +75,7 @@ def test_each_fault_changes_the_receiver_alone(flight):
 def test_step_glitch_and_gaps_in_one_flight(flight):
     span = moving_span(flight.samples)
     every = (STEP, GLITCH, GAPS)
-    samples = reduce(lambda s, f: list(f.laid_over(s, span)), every[:-1], flight.samples)
+    samples = functools.reduce(lambda s, f: list(f.laid_over(s, span)), every[:-1], flight.samples)
     faulted = Flight(flight.name, flight.vehicle, samples, flight.truth, flight.delay)
     (o,) = outcomes(faulted, GAPS)
     assert o.calibrated

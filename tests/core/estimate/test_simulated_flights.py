@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.events import Restarted
@@ -28,9 +27,8 @@ MOVED = {"scale": (0.98, 1.01, 1.03), "offset": (-0.1, 0.2, 0.4)}
 
 def flown(vehicle, duration, *, imu=TRUE, rates=RATES, **more):
     spec = FlightSpec(vehicle=vehicle, duration=duration, imus=(imu,), rates=rates, **more)
-    parser, decoder = mav.MAVLink(None), Decoder(system=1, component=1)
-    messages = (m for _, frame in recording.fly(spec) for m in parser.parse_buffer(frame))
-    samples = [s for m in messages for s in decoder.decode(m)]
+    decoder = Decoder(system=1, component=1)
+    samples = [s for _, m in recording.fly_messages(spec) for s in decoder.decode(m)]
     return samples, recording.truth_record(spec)["net_gps_delay_s"]
 
 
