@@ -29,7 +29,7 @@ from onboard.core.estimate.limits import (
     STEADY,
     WORTH_A_SEARCH,
 )
-from onboard.core.estimate.noise_search import NoiseSearch
+from onboard.core.estimate.noise_search import NoiseSearch, told_by
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
@@ -269,9 +269,10 @@ class Engine:
         Args:
             levels: whether noise levels are not told.
         """
-        search = NoiseSearch(settled=not levels, blind=self._seed is None)
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
+        names = told_by(batch for part in sample for batch in part)
+        search = NoiseSearch(names, settled=not levels, blind=self._seed is None)
         highest, best, idle = -math.inf, (self.point, self.noise), 0
         elsewhere = False
         for turn in range(MOST_ROUNDS):

@@ -43,6 +43,8 @@ class NoiseLevels:
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
         jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as
             much of the acceleration (that they err together is left out).
+        stated: share of the variances of the velocity, white and coloured, that goes with the
+            square of the accuracy that the receiver states.
     """
 
     velocity: float = 0.05
@@ -59,6 +61,7 @@ class NoiseLevels:
     heading_walk: float = 3e-4
     attitude_white: float = 5e-4
     jitter: float = 3e-3
+    stated: float = 0.5
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -93,9 +96,10 @@ ESTIMATED = (
     "heading_walk",
     "attitude_white",
     "jitter",
+    "stated",
 )
 
-NO_VARIANCES = ("vertical", "heading_time")
+NO_VARIANCES = ("vertical", "heading_time", "stated")
 """Those of :data:`ESTIMATED` that are no standard deviation or density of noise."""
 
 

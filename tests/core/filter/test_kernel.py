@@ -55,7 +55,8 @@ def turned(rng):
 def step_of(rng, m):
     shapes = ((3, 3), (3,), (3,), (3, 3), (3, m), (3, m), (3, m))
     integrals = (0.3 * rng.normal(size=(1, *s)) for s in shapes)
-    return steps(np.array([0.2]), *integrals, rng.uniform(0.0, 0.1, size=(1, 6)))[0]
+    missed, stated = rng.uniform(0.0, 0.1, size=(1, 6)), rng.uniform(0.1, 10.0, size=1)
+    return steps(np.array([0.2]), *integrals, missed, stated)[0]
 
 
 def process_of(rng, members):
@@ -226,6 +227,8 @@ def troubled(batches):
         v_n, height = batch.fixes.v_n.copy(), batch.fixes.height.copy()
         trusted = batch.trusted.copy()
         n = len(v_n)
+        accuracy = np.where(np.arange(n) % 11 < 5, 0.9, 0.2)
+        accuracy[n // 4] = np.nan
         if i == 2:
             v_n[n // 2 : n // 2 + 5, 0] += 30.0
             trusted[3:5] = False
@@ -234,9 +237,8 @@ def troubled(batches):
             v_n[n // 2, 0] = np.nan
             height[-3:] += 80.0
             v_n[1::7, 1] += 0.6
-        out.append(
-            replace(batch, fixes=replace(batch.fixes, v_n=v_n, height=height), trusted=trusted)
-        )
+        fixes = replace(batch.fixes, v_n=v_n, height=height, accuracy=accuracy)
+        out.append(replace(batch, fixes=fixes, trusted=trusted))
     return out
 
 
