@@ -82,7 +82,7 @@ class NoiseSearch:
             return levels
         near = 1 + len(self._way)
         rise = np.array(log_likelihoods) - log_likelihoods[0]
-        likely = rise[:near] + [log_prior(tried) for tried in (levels, *self._way)]
+        likely = rise[:near] + [log_prior(tried, self._names) for tried in (levels, *self._way)]
         best = int(np.argmax(likely))
         if best:
             # The step was too long.  If no part of it was any good, then no other step will be,

@@ -19,7 +19,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter import kernel
 from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.kernel import NUMPY, Process
-from onboard.core.filter.noise import NoiseLevels, neighbours
+from onboard.core.filter.noise import USUAL, NoiseLevels, neighbours
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
@@ -198,7 +198,7 @@ def relative(N):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bank", [(NoiseLevels(),), neighbours(NoiseLevels())], ids=["one", "bank"])
+@pytest.mark.parametrize("bank", [(USUAL,), neighbours(USUAL)], ids=["one", "bank"])
 @pytest.mark.usefixtures("_preference_kept")
 def test_a_flight_gives_the_same_sums_either_way(engine, bank):
     def sums():
@@ -249,7 +249,7 @@ def test_epoch_by_epoch_either_way_sees_the_same(engine, held):
     prior = engine.model.prior, np.diag(engine.model.prior_sigma**2)
 
     def seen():
-        made = Pass(engine.model, engine.point, (NoiseLevels(),), traces=True)
+        made = Pass(engine.model, engine.point, (USUAL,), traces=True)
         if held:
             made.hold(*prior)
         return made, [through(made, batch, 30.0) for batch in batches]
@@ -339,7 +339,7 @@ def test_two_processes_may_fill_the_same_cache(tmp_path):
 @pytest.mark.usefixtures("_preference_kept")
 def test_what_members_change_is_that_of_filters_of_their_own(engine):
     """Products of differences of whitened innovations, each member's from a filter by itself."""
-    bank = (NoiseLevels(), NoiseLevels(velocity=0.08), NoiseLevels(force_walk=0.06, jitter=0.01))
+    bank = (USUAL, NoiseLevels(velocity=0.08), NoiseLevels(force_walk=0.06, jitter=0.01))
     batch = engine.batches[1]
     # Attitude and the earth's turning are member 0's for all: held, and left out.
     free = Uses(recorded_attitude=True, earth=False)
