@@ -41,6 +41,8 @@ AT_LIMIT = 0.01
 """A level is at an end within this share of it."""
 FLOORLESS = frozenset({"vertical", "heading_time"})
 """Levels whose lower end is a lowest value, not what no flight is without."""
+WHOLE = frozenset({"stated"})
+"""Shares: none or all of it is an answer, not an end of a range."""
 
 
 STANDS_S = 2.0
@@ -147,6 +149,8 @@ class Fit:
 
     def _at_ends(self) -> Iterator[tuple[str, bool]]:
         for name, level in self.levels.items():
+            if name in WHOLE:
+                continue
             low, high = LIMITS[name]
             if level <= low * (1.0 + AT_LIMIT) or level >= high * (1.0 - AT_LIMIT):
                 yield name, level >= high * (1.0 - AT_LIMIT)

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +88,8 @@ def _json(value: Any) -> Any:  # noqa: ANN401 - whatever a record holds
             return [_json(v) for v in value]
         case float() if not math.isfinite(value):
             return None
+        case Enum():
+            return value.value
         case _:
             return value
 

@@ -29,11 +29,11 @@ from onboard.core.estimate.limits import (
     STEADY,
     WORTH_A_SEARCH,
 )
-from onboard.core.estimate.noise_search import NoiseSearch
+from onboard.core.estimate.noise_search import NoiseSearch, told_by
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
-from onboard.core.filter.noise import NoiseLevels, log_prior
+from onboard.core.filter.noise import USUAL, NoiseLevels, log_prior
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
@@ -269,9 +269,12 @@ class Engine:
         Args:
             levels: whether noise levels are not told.
         """
-        search = NoiseSearch(settled=not levels, blind=self._seed is None)
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
+        names = told_by(batch for part in sample for batch in part)
+        search = NoiseSearch(names, settled=not levels, blind=self._seed is None)
+        if levels and "stated" in names and not self.noise.stated:
+            self.noise = replace(self.noise, stated=USUAL.stated)
         highest, best, idle = -math.inf, (self.point, self.noise), 0
         elsewhere = False
         for turn in range(MOST_ROUNDS):
@@ -281,7 +284,7 @@ class Engine:
             if turn == 0:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             likelihoods = made.log_likelihoods()
-            likely = likelihoods[0] + log_prior(self.noise)
+            likely = likelihoods[0] + log_prior(self.noise, names)
             idle = idle + 1 if likely < highest + WORTH_A_SEARCH else 0
             if likely > highest:
                 highest, best = likely, (self.point, self.noise)

@@ -2,28 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from onboard.core.estimate.limits import WORTH_A_SEARCH
 from onboard.core.filter.limits import SHARES
-from onboard.core.filter.noise import NoiseLevels, between, log_prior, neighbours
+from onboard.core.filter.noise import (
+    ESTIMATED,
+    NoiseLevels,
+    between,
+    log_prior,
+    neighbours,
+)
 from onboard.core.filter.noise_step import scoring_step
+from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
+
+
+def told_by(batches: Iterable[Batch]) -> tuple[str, ...]:
+    """Levels that a flight can say anything of.
+
+    What goes with the accuracy that a receiver states is not told where that is always the same.
+    """
+    stated = [b.fixes.accuracy[np.isfinite(b.fixes.accuracy)] for b in batches]
+    if stated and len(np.unique(np.concatenate(stated))) > 1:
+        return ESTIMATED
+    return tuple(name for name in ESTIMATED if name != "stated")
 
 
 class NoiseSearch:
     """Says which levels a filter bank should try next."""
 
-    def __init__(self, *, settled: bool = False, blind: bool = False) -> None:
+    def __init__(
+        self, names: Sequence[str] = ESTIMATED, *, settled: bool = False, blind: bool = False
+    ) -> None:
         """Take where it begins.
 
         Args:
+            names: levels that the flight can say anything of.
             settled: whether the levels stand, without a search.
             blind: whether nothing is known of timing yet.  The first pass then finds that alone:
                 what it is off by would pass for noise.
         """
+        self._names = names
         self._before: NoiseLevels | None = None
         self._way: list[NoiseLevels] = []
         self._failed = False
@@ -36,7 +58,7 @@ class NoiseSearch:
         if self.settled or self._blind:
             return (levels,)
         self._way = [] if self._before is None else between(self._before, levels, SHARES)
-        return (levels, *self._way, *neighbours(levels))
+        return (levels, *self._way, *neighbours(levels, self._names))
 
     def better(
         self,
@@ -60,7 +82,7 @@ class NoiseSearch:
             return levels
         near = 1 + len(self._way)
         rise = np.array(log_likelihoods) - log_likelihoods[0]
-        likely = rise[:near] + [log_prior(tried) for tried in (levels, *self._way)]
+        likely = rise[:near] + [log_prior(tried, self._names) for tried in (levels, *self._way)]
         best = int(np.argmax(likely))
         if best:
             # The step was too long.  If no part of it was any good, then no other step will be,
@@ -70,7 +92,9 @@ class NoiseSearch:
             self._failed, self._before = nothing, None
             return self._way[best - 1]
         # While the linearisation moves, what it was off by passes for noise that will be gone.
-        step = scoring_step(levels, rise[near:], trades[near:, near:], in_variances=not elsewhere)
+        step = scoring_step(
+            levels, rise[near:], trades[near:, near:], self._names, in_variances=not elsewhere
+        )
         self.settled = step.gain < WORTH_A_SEARCH
         self._before = levels
         return levels if self.settled else step.levels

@@ -106,7 +106,7 @@ class InnovationGates:
 
     def __init__(self, levels: NoiseLevels) -> None:
         """Take the noise levels that the innovations were whitened with."""
-        self._noise = math.hypot(levels.velocity, levels.velocity_colour, RECEIVER_M_S)
+        self._noise = math.hypot(levels.velocity, levels.velocity_colour)
         self.forget()
 
     def forget(self) -> None:
@@ -135,6 +135,7 @@ class InnovationGates:
         C: Uncertainty,
         whitener: Array,
         *,
+        wider: float = 1.0,
         velocity: str | None = None,
     ) -> GateRefusal | None:
         """Find the first measurement whose innovation is impossible, given all uncertainty.
@@ -149,6 +150,7 @@ class InnovationGates:
             theta: (m,) estimate.
             C: how well it is known.
             whitener: (r, r) what innovations are multiplied by to be white.
+            wider: how many times its usual error the receiver states for the velocity.
             velocity: which gate refuses it, where that is known, empty for none; None: judge it.
 
         Returns:
@@ -177,7 +179,9 @@ class InnovationGates:
                 return self._outside(kind, name, t)
             if kind == "h":
                 self.height_is_inside()
-            elif kind == "v" and self._recovers(t, E[:n, 0] - E[:n, 1:] @ theta):
+            elif kind == "v" and self._recovers(
+                t, E[:n, 0] - E[:n, 1:] @ theta, math.hypot(wider * self._noise, RECEIVER_M_S)
+            ):
                 return GateRefusal("recovery")
         return None
 
@@ -188,7 +192,7 @@ class InnovationGates:
             return GateRefusal(name)
         return GateRefusal(name, renewed=self._outlasts(t))
 
-    def _recovers(self, t: float, innovation: Array) -> bool:
+    def _recovers(self, t: float, innovation: Array, noise: float) -> bool:
         """True while a receiver that was off has not been right, and steady, for long enough.
 
         After seconds of dead reckoning the gate is wide; a receiver that is only noisy falls into
@@ -198,7 +202,7 @@ class InnovationGates:
             return False
         if self._good:
             before, last = self._good[-1]
-            most = RECOVERY_SIGMAS * self._noise + RECOVERY_DRIFT * (t - before)
+            most = RECOVERY_SIGMAS * noise + RECOVERY_DRIFT * (t - before)
             if len(last) != len(innovation) or float(np.abs(innovation - last).max()) > most:
                 self._good = []
         self._good.append((t, innovation))

@@ -32,6 +32,7 @@ class Step:
         columns: (9, m + 1) stack of what the m unknowns add to velocity, height and attitude;
             nothing is known, column 0 is zero.
         missed: (6,) variances of what the samples miss: of velocity, (m/s)^2, and turn, rad^2.
+        stated: of the fix that it leads to, as in :class:`Epoch`.
     """
 
     duration: float
@@ -39,6 +40,7 @@ class Step:
     moved: Array
     columns: Array
     missed: Array
+    stated: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +52,21 @@ class Steps:
     moved: Array
     columns: Array
     missed: Array
+    stated: Array
 
     def __len__(self) -> int:
         return len(self.duration)
 
     def __getitem__(self, k: int) -> Step:
         duration = float(self.duration[k])
-        return Step(duration, self.turn[k], self.moved[k], self.columns[k], self.missed[k])
+        return Step(
+            duration,
+            self.turn[k],
+            self.moved[k],
+            self.columns[k],
+            self.missed[k],
+            float(self.stated[k]),
+        )
 
 
 def steps(
@@ -69,6 +79,7 @@ def steps(
     columns_to_end: Array,
     columns_turn: Array,
     missed: Array,
+    stated: Array,
 ) -> Steps:
     """K steps of prediction from their integrals.
 
@@ -82,6 +93,7 @@ def steps(
         columns_to_end: (K, 3, m) as ``force_to_end``.
         columns_turn: (K, 3, m) the turn that they add, rad per unit.
         missed: (K, 6) as in :class:`Step`.
+        stated: (K,) see there.
     """
     K, _, m = columns.shape
     # What turns at a steady rate meets the force on the mean in proportion to its time left.
@@ -93,7 +105,7 @@ def steps(
     stack[:, 0:3, 1:] = arm @ columns_turn - columns
     stack[:, 3:6, 1:] = columns_to_end
     stack[:, 6:9, 1:] = -columns_turn
-    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed)
+    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed, stated)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +126,8 @@ class Epoch:
         noise: (7,) variances beside those of the levels.
         moving: (7,) squares of how fast each number changes, its unit squared per s^2.
         stamp: the receiver's, on the boot clock, s: whatever latency is taken out of ``t``.
+        stated: square of the velocity's accuracy by the receiver's own word, over that of
+            :data:`~onboard.core.filter.limits.STATED_M_S`; 1 where it says nothing.
     """
 
     t: float
@@ -128,6 +142,7 @@ class Epoch:
     noise: Array = field(default_factory=lambda: np.zeros(MEASURED))
     moving: Array = field(default_factory=lambda: np.zeros(MEASURED))
     stamp: float = math.nan
+    stated: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +168,7 @@ class Epochs:
     noise: Array
     moving: Array
     stamp: Array
+    stated: Array
 
     def __len__(self) -> int:
         return len(self.t)
@@ -173,6 +189,7 @@ class Epochs:
             self.noise[e],
             self.moving[e],
             float(self.stamp[e]),
+            float(self.stated[e]),
         )
 
 

@@ -98,6 +98,10 @@ STAMP_JITTER_S: Final = 8e-4
 """s; by how much a recorded attitude's stamp may be off beside a constant delay: whole milliseconds
 (0.29) and the autopilot's loop of 2.5 ms (0.72), uniform both [physics]."""
 
+STATED_M_S: Final = 0.3
+"""m/s; the accuracy of a velocity that noise levels are of, by the receiver's own word: what
+ArduPilot's simulator says, and receivers with a good sky [data sheet]."""
+
 # The search for noise levels (noise).
 
 LIMITS: Final[dict[str, tuple[float, float]]] = {
@@ -115,6 +119,7 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "heading_walk": (5e-5, 0.03),
     "attitude_white": (3e-5, 0.03),
     "jitter": (3e-4, 0.2),
+    "stated": (0.01, 1.0),
 }
 """Floors and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
@@ -129,7 +134,8 @@ sheets].  They are there for simulations without noise, which must not make the 
 timing, interpolation and filters are modelled to the last digit.  A gyroscope's bias wanders by
 3e-3 rad/s in a second at the most, where vibration is rectified and changes with the throttle
 [physics]; the jitter of a velocity's moment is at least that of whole milliseconds, and at most the
-time between two fixes, five a second being the fewest that ArduPilot flies with [physics].
+time between two fixes, five a second being the fewest that ArduPilot flies with [physics].  A share
+is a hundredth or all of it [bound].
 Velocities down are as good as those north and east but for a factor of ten, and a heading that is
 off for longer than ten minutes is off for the flight [physics].
 

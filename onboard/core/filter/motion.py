@@ -75,6 +75,8 @@ def carry(
     settled: Array,
     times: Array,
     heading_time: Array,
+    share: Array,
+    stated: float,
     gravity: float,
     earth: int,
 ) -> None:
@@ -107,7 +109,10 @@ def carry(
         for i in range(STATES):
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
         for i in range(MEASURED - 1):
-            after[b, ERRORS + i] += settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
+            driven = settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
+            if i < 3:
+                driven *= 1.0 + share[b] * (stated - 1.0)
+            after[b, ERRORS + i] += driven
     predict(carried, R_nb, T, moved, columns, missed, fall, decay, swing, before, after)
     for i in range(3):
         a, b_, c_ = R_nb[i, 0], R_nb[i, 1], R_nb[i, 2]

@@ -43,6 +43,8 @@ class NoiseLevels:
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
         jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as
             much of the acceleration (that they err together is left out).
+        stated: share of the variances of the velocity, white and coloured, that goes with the
+            square of the accuracy that the receiver states; none where that tells nothing.
     """
 
     velocity: float = 0.05
@@ -59,6 +61,7 @@ class NoiseLevels:
     heading_walk: float = 3e-4
     attitude_white: float = 5e-4
     jitter: float = 3e-3
+    stated: float = 0.0
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -75,7 +78,7 @@ class NoiseLevels:
         )
 
 
-USUAL = NoiseLevels()
+USUAL = NoiseLevels(stated=0.5)
 """Levels that a flight is expected to have."""
 
 ESTIMATED = (
@@ -93,9 +96,10 @@ ESTIMATED = (
     "heading_walk",
     "attitude_white",
     "jitter",
+    "stated",
 )
 
-NO_VARIANCES = ("vertical", "heading_time")
+NO_VARIANCES = ("vertical", "heading_time", "stated")
 """Those of :data:`ESTIMATED` that are no standard deviation or density of noise."""
 
 
@@ -122,12 +126,7 @@ def neighbours(centre: NoiseLevels, names: Sequence[str] = ESTIMATED) -> tuple[N
 
 def between(start: NoiseLevels, end: NoiseLevels, shares: Sequence[float]) -> list[NoiseLevels]:
     """Levels at some shares of the way from ``start`` to ``end``, in log-levels."""
+    both = [(getattr(start, f.name), getattr(end, f.name)) for f in fields(NoiseLevels)]
     return [
-        NoiseLevels(
-            *(
-                getattr(start, f.name) * (getattr(end, f.name) / getattr(start, f.name)) ** share
-                for f in fields(NoiseLevels)
-            )
-        )
-        for share in shares
+        NoiseLevels(*(a if a == b else a * (b / a) ** share for a, b in both)) for share in shares
     ]

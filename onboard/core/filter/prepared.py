@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.filter.innovations import Epochs, Steps, steps
-from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S
+from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S, STATED_M_S
 from onboard.core.filter.missed import missed_between
 from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
@@ -78,19 +78,30 @@ def prepare(
     """
     epoch_t = point.true_time(fixes.t)
     maker = NodeMaker(segment, bias_b, point.six, recorded_attitude=recorded_attitude)
-    start, end, measured = _subdivide(epoch_t)
+    start, end, measured, leads_to = _subdivide(epoch_t)
+    stated = _stated(fixes)
     intervals = maker.intervals(start, end)
     near = around(maker, epoch_t, point.window, np.array(point.antenna), np.array(point.shapes))
     regressors = model.regressors(intervals, near)
     return Prepared(
-        _steps(intervals, regressors, missed_between(segment, start, end)),
+        _steps(intervals, regressors, missed_between(segment, start, end), stated[leads_to]),
         measured,
-        _epochs(segment, fixes, trusted, point, near, regressors),
+        _epochs(segment, fixes, trusted, stated, point, near, regressors),
     )
 
 
-def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
-    """Starts (K,), ends (K,) and measured epoch (K,), or -1, of steps between epochs (n,), s."""
+def _stated(fixes: Fixes) -> Array:
+    """(n,) as in :class:`~onboard.core.filter.innovations.Epoch`."""
+    if not len(fixes.accuracy):
+        return np.ones(len(fixes))
+    return np.where(np.isfinite(fixes.accuracy), (fixes.accuracy / STATED_M_S) ** 2, 1.0)
+
+
+def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_], NDArray[np.int_]]:
+    """Starts (K,), ends (K,), s, of steps between epochs (n,), and the epoch that each leads to.
+
+    The third is the same epoch (K,), but -1 where other steps follow before it is measured.
+    """
     gap = np.diff(epoch_t)
     parts = np.maximum(np.ceil(gap / LONGEST_STEP_S), 1.0).astype(int)
     k = np.repeat(np.arange(len(gap)), parts)
@@ -99,10 +110,12 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_]]:
     width = (gap / parts)[k]
     start = epoch_t[k] + part * width
     end = np.where(last, epoch_t[k + 1], epoch_t[k] + (part + 1) * width)
-    return start, end, np.where(last, k + 1, -1)
+    return start, end, np.where(last, k + 1, -1), k + 1
 
 
-def _steps(intervals: Intervals, regressors: SegmentRegressors, missed: Array) -> Steps:
+def _steps(
+    intervals: Intervals, regressors: SegmentRegressors, missed: Array, stated: Array
+) -> Steps:
     force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
     return steps(
         intervals.duration,
@@ -114,6 +127,7 @@ def _steps(intervals: Intervals, regressors: SegmentRegressors, missed: Array) -
         regressors.force2,
         regressors.turn,
         missed,
+        stated,
     )
 
 
@@ -121,6 +135,7 @@ def _epochs(
     segment: Segment,
     fixes: Fixes,
     trusted: NDArray[np.bool_],
+    stated: Array,
     point: Linearisation,
     nodes: Around,
     c: SegmentRegressors,
@@ -164,4 +179,5 @@ def _epochs(
         noise,
         moving,
         fixes.t,
+        stated,
     )

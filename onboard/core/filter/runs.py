@@ -72,12 +72,17 @@ def _spread(ned: Array, acting: Index, m1: int) -> Array:
 
 
 @part
-def _sum(white: Array, more: Array, jitter: Array, moving: Array) -> Array:
+def _sum(
+    white: Array, more: Array, jitter: Array, moving: Array, share: Array, stated: float
+) -> Array:
     """Variances (B, n) and what an epoch (n,) adds to them, as ``Variances.of_reading``."""
     out = np.empty(white.shape)
     for b in range(len(white)):
         for i in range(len(more)):
-            out[b, i] = white[b, i] + more[i] + jitter[b] * moving[i]
+            out[b, i] = white[b, i]
+            if i < 3:
+                out[b, i] *= 1.0 + share[b] * (stated - 1.0)
+            out[b, i] += more[i] + jitter[b] * moving[i]
     return out
 
 
@@ -119,9 +124,9 @@ def _note(
 
 @compiled(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
-    " f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1], f8[:,:,::1],"
-    " i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1],"
-    " f8[::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
+    " f8[:,:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1],"
+    " f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1],"
+    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -136,6 +141,7 @@ def run(
     moved: Array,
     columns: Array,
     missed: Array,
+    leads_to: Array,
     latitude: Array,
     ends: Index,
     offered: Index,
@@ -146,12 +152,14 @@ def run(
     along: Array,
     noise: Array,
     moving: Array,
+    stated: Array,
     walk: Array,
     settled: Array,
     white: Array,
     jitter: Array,
     times: Array,
     heading_time: Array,
+    share: Array,
     tails: Array,
     gravity: float,
     earth: int,
@@ -178,11 +186,12 @@ def run(
         moved: see there.
         columns: see there.
         missed: see there.
+        leads_to: (K,) ``stated`` of the epoch that each step leads to.
         latitude: (n,) rad.
         ends: (K,) the epoch at the end of each step; -1: none.
         offered: (n, 4) components of velocity, of height, of attitude over three; what is known of
             the velocity: 0 nothing, 1 that it is not refused, 2 that it is.
-        R_attitude: (n, 3, 3) and body, ned, acting, along, noise and moving as in
+        R_attitude: (n, 3, 3) and body, ned, acting, along, noise, moving and stated as in
             :class:`~..innovations.Epochs`.
         body: see there.
         ned: see there.
@@ -190,12 +199,14 @@ def run(
         along: see there.
         noise: see there.
         moving: see there.
+        stated: see there.
         walk: (B, STATES) and settled, white and jitter as in :class:`~..variances.Variances`.
         settled: see there.
         white: see there.
         jitter: see there.
         times: (2,) of the slow errors of velocity and tilt, s.
         heading_time: (B,) of that of the heading, s.
+        share: (B,) of the velocity's variances that goes with ``stated``.
         tails: (4,) by degrees of freedom.
         gravity: m/s^2.
         earth: whether it turns.
@@ -231,6 +242,8 @@ def run(
             settled,
             times,
             heading_time,
+            share,
+            leads_to[k],
             gravity,
             earth,
         )
@@ -248,9 +261,8 @@ def run(
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
         E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
         var = np.empty((members, r))
-        if whiten(
-            carried, z, number, _sum(white, noise[e], jitter, moving[e]), E, W, whitener, var
-        ):
+        reads = _sum(white, noise[e], jitter, moving[e], share, stated[e])
+        if whiten(carried, z, number, reads, E, W, whitener, var):
             return 1
         if not _ordinary(W, theta, offered[e], tails):
             return 1

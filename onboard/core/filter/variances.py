@@ -39,9 +39,10 @@ class Variances:
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
         jitter: (B,) of the moment that a velocity is of, s^2.
         heading_time: (B,) time of the heading's smooth error, s.
+        stated: (B,) share of the velocity's variances that goes with what the receiver states.
     """
 
-    __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "walk")
+    __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "stated", "walk")
 
     def __init__(self, bank: Sequence[NoiseLevels], *, attitude: bool) -> None:
         """Take the noise levels of each member, and whether the attitude may err at all."""
@@ -52,6 +53,7 @@ class Variances:
         self.reading = np.zeros((B, MEASURED))
         self.jitter = np.array([q.jitter**2 for q in bank])
         self.heading_time = np.array([q.heading_time for q in bank])
+        self.stated = np.array([q.stated for q in bank])
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2
             self.walk[i, CH] = q.height_walk**2
@@ -68,31 +70,42 @@ class Variances:
         if attitude:
             self.walk[:, RATE] = rate_walk(self.heading_time) * self.settled[:, -1]
 
-    def of_reading(self, noise: Array, moving: Array) -> Array:
+    def of_reading(self, noise: Array, moving: Array, stated: float) -> Array:
         """(B, MEASURED) of the white noise of what one epoch measures.
 
         Args:
-            noise: (MEASURED,) and moving as in :class:`~onboard.core.filter.innovations.Epoch`.
+            noise: (MEASURED,), moving and stated as in
+                :class:`~onboard.core.filter.innovations.Epoch`.
             moving: see there.
+            stated: see there.
         """
-        out: Array = self.reading + noise + self.jitter[:, None] * moving
+        out = self.reading.copy()
+        out[:, V] *= self.times(stated)[:, None]
+        out += noise + self.jitter[:, None] * moving
+        return out
+
+    def times(self, stated: float) -> Array:
+        """(B,) how many times its usual variance a velocity has; ``stated`` as in the epoch."""
+        out: Array = 1.0 + self.stated * (stated - 1.0)
         return out
 
     def at_start(
-        self, tilt_sigma: float, heading_sigma: float, *, down: bool, height: bool
+        self, tilt_sigma: float, heading_sigma: float, stated: float, *, down: bool, height: bool
     ) -> Array:
         """Covariance (B, STATES, STATES) of a filter that starts at a fix.
 
         Args:
             tilt_sigma: of the first attitude's roll and pitch, rad.
             heading_sigma: of its heading, rad.
+            stated: as in :class:`~onboard.core.filter.innovations.Epoch`.
             down: whether the fix has a vertical speed.
             height: whether its height is used.
         """
         B = len(self.reading)
-        colour = self.settled[:, V]
+        times = self.times(stated)[:, None]
+        colour = self.settled[:, V] * times
         var = np.zeros((B, STATES))
-        var[:, V] = self.reading[:, V]
+        var[:, V] = self.reading[:, V] * times
         if not down:
             var[:, 2] = UNKNOWN_DOWN_START_M_S**2
         var[:, H] = self.reading[:, H] if height else UNKNOWN_HEIGHT_VAR
@@ -100,6 +113,7 @@ class Variances:
             var[:, PSI] = (tilt_sigma**2, tilt_sigma**2, heading_sigma**2)
             var[:, BIAS] = BIAS_START_RAD_S**2
         var[:, ERRORS:RATE] = self.settled
+        var[:, CV] = colour
         var[:, RATE] = settled_rate(self.heading_time) * self.settled[:, -1]
         var[:, V] += colour
         P = np.zeros((B, STATES, STATES))
@@ -110,7 +124,7 @@ class Variances:
             P[:, i, c] = P[:, c, i] = -colour[:, i]
         return P
 
-    def over(self, duration: float, decay: Array) -> tuple[Array, Array]:
+    def over(self, duration: float, decay: Array, stated: float) -> tuple[Array, Array]:
         """Process noise of a step, what acts before and what after its transition.
 
         A random walk acts along the step: half of it before, half after the transition, and so does
@@ -120,11 +134,14 @@ class Variances:
         Args:
             duration: s.
             decay: (B, MEASURED) factors by which the slow errors have decayed.
+            stated: as in :class:`~onboard.core.filter.innovations.Step`.
 
         Returns:
             Two arrays (B, STATES), unit of the state squared.
         """
         before = self.walk * (0.5 * duration)
         after = before.copy()
-        after[:, ERRORS:HEADING] += (self.settled * (1.0 - decay * decay))[:, :-1]
+        driven = self.settled * (1.0 - decay * decay)
+        driven[:, V] *= self.times(stated)[:, None]
+        after[:, ERRORS:HEADING] += driven[:, :-1]
         return before, after

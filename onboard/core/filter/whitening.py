@@ -156,6 +156,7 @@ class WhiteningFilter:
         covariances(self.carried, m1)[:, 0] = self.variances.at_start(
             tilt_sigma,
             heading_sigma,
+            epoch.stated,
             down=known,
             height=self.uses.height,
         )
@@ -198,7 +199,7 @@ class WhiteningFilter:
         decay = np.empty((len(self.bank), MEASURED))
         decay[:] = (cv, cv, cv, 1.0, tilt, tilt, 1.0)
         decay[:, -1], swing = moved(T, self.variances.heading_time)
-        process = Process(fall, decay, swing, *self.variances.over(T, decay))
+        process = Process(fall, decay, swing, *self.variances.over(T, decay, step.stated))
         self.kernel.predict(self.carried, R, step, process)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R
@@ -229,7 +230,7 @@ class WhiteningFilter:
         off = np.zeros(0)
         unlikely = np.zeros(len(self.bank))
         z = self._measured(epoch, theta)
-        white = self.variances.of_reading(epoch.noise, epoch.moving)
+        white = self.variances.of_reading(epoch.noise, epoch.moving, epoch.stated)
         while kinds:
             made = self.kernel.whiten(self.carried, z, reading(kinds), white)
             refusal = None
@@ -237,7 +238,16 @@ class WhiteningFilter:
                 y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
                 known = None if self.uses.refused is None else self.uses.refused.by(epoch.stamp)
                 refusal = self.gates.judge(
-                    epoch.t, kinds, made.E, y, h, theta, uncertainty, made.whitener, velocity=known
+                    epoch.t,
+                    kinds,
+                    made.E,
+                    y,
+                    h,
+                    theta,
+                    uncertainty,
+                    made.whitener,
+                    wider=math.sqrt(self.variances.times(epoch.stated)[0]),
+                    velocity=known,
                 )
             if refusal is None:
                 if self.gates is not None:
@@ -326,7 +336,7 @@ class WhiteningFilter:
         read = reading(kinds)
         both = innovations(self.carried[:1], self._measured(epoch, theta), read)[0]
         E, PH = both[:, : self._m1], both[:, self._m1 :]
-        white = self.variances.of_reading(epoch.noise, epoch.moving)
+        white = self.variances.of_reading(epoch.noise, epoch.moving, epoch.stated)
         noise = np.diag(white[0, read.first])
         S = noise - PH[:, read.first] - PH[:, read.second]
         D = E[:, 1:]

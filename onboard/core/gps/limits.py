@@ -78,7 +78,8 @@ class TrustLimits:
         fix_type: at least; 3 is 3D [physics: height is needed].
         satellites: at least [data sheet: one more than a redundant solution needs].
         hdop: at most [tuned].
-        speed_accuracy: at most, m/s, by the receiver's own word [tuned].
+        speed_accuracy: at most, m/s, by the receiver's own word.  What it says is how much a fix
+            weighs; of one that is worse, less than a hundredth of a usual one's [cost].
         gap: longest time between fixes, s.
         duration: s from the first opening on, after which the window ends for good; None: as long
             as GPS is there.
@@ -89,7 +90,7 @@ class TrustLimits:
     fix_type: int = FIX_3D
     satellites: int = 6
     hdop: float = 2.5
-    speed_accuracy: float = 1.5
+    speed_accuracy: float = 5.0
     gap: float = LONGEST_FIX_GAP_S
     duration: float | None = None
     plausibility: PlausibilityLimits = field(default_factory=PlausibilityLimits)

@@ -45,6 +45,8 @@ class Fixes:
         latitude: (n,) rad.
         late: (n,) how much later they are stamped than the time from which the autopilot counts the
             receiver's latency, s; empty where that is not known to differ.
+        accuracy: (n,) of the velocity by the receiver's own word, m/s; NaN where it says nothing,
+            empty where it never does.
     """
 
     t: Array
@@ -52,6 +54,7 @@ class Fixes:
     height: Array
     latitude: Array
     late: Array = field(default_factory=lambda: np.zeros(0))
+    accuracy: Array = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -60,7 +63,12 @@ class Fixes:
         """Epochs ``start:stop``."""
         cut = slice(start, stop)
         return Fixes(
-            self.t[cut], self.v_n[cut], self.height[cut], self.latitude[cut], self.late[cut]
+            self.t[cut],
+            self.v_n[cut],
+            self.height[cut],
+            self.latitude[cut],
+            self.late[cut],
+            self.accuracy[cut],
         )
 
 

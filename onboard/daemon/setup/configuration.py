@@ -106,7 +106,7 @@ class EstimatorSettings(Section, frozen=True, kw_only=True):
     window_s: NotNegative = 0.0
     satellites_min: Annotated[int, Meta(ge=0, le=50)] = 6
     hdop_max: Positive = 2.5
-    speed_accuracy_max: Positive = 1.5
+    speed_accuracy_max: Positive = 5.0
     buffer_s: Annotated[float, Meta(ge=60.0, le=3600.0)] = 300.0
     memory_s: Annotated[float, Meta(ge=60.0, le=LARGEST)] = 1800.0
     save_every_s: Positive = 60.0

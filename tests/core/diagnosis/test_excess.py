@@ -12,7 +12,7 @@ from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter.limits import LIMITS
-from onboard.core.filter.noise import ESTIMATED, NoiseLevels
+from onboard.core.filter.noise import ESTIMATED, NO_VARIANCES, NoiseLevels
 from onboard.core.inputs.samples import AttitudeSample
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import random_imus
@@ -20,7 +20,7 @@ from sitl.recording import FlightSpec, fly_messages
 
 
 def test_every_level_that_is_looked_for_has_words_but_the_time():
-    assert set(WORDS) == set(ESTIMATED) - {"heading_time", "vertical"}
+    assert set(WORDS) == set(ESTIMATED) - set(NO_VARIANCES)
 
 
 @pytest.mark.parametrize("name", sorted(WORDS))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from onboard.core.estimate.limits import MOST_ROUNDS, WORTH_A_SEARCH
-from onboard.core.estimate.noise_search import NoiseSearch
-from onboard.core.filter.noise import NoiseLevels, neighbours
+from onboard.core.estimate.noise_search import NoiseSearch, told_by
+from onboard.core.filter.noise import ESTIMATED, USUAL, NoiseLevels, neighbours
+from onboard.core.inputs.segments import Batch, Fixes, Segment
 
 
 def changes(levels: NoiseLevels, velocity: float) -> np.ndarray:
@@ -23,7 +26,7 @@ def likelihood(levels: NoiseLevels, velocity: float) -> float:
 
 def searched(velocity: float) -> tuple[NoiseLevels, int]:
     """Levels that are found, and in how many passes."""
-    levels, search, passes = NoiseLevels(), NoiseSearch(), 0
+    levels, search, passes = USUAL, NoiseSearch(), 0
     while not search.settled and passes < MOST_ROUNDS:
         passes += 1
         members = search.members(levels)
@@ -57,7 +60,7 @@ def tried(
 
 
 def test_a_step_that_was_too_long_goes_back_a_part_of_the_way():
-    search, start = NoiseSearch(), NoiseLevels()
+    search, start = NoiseSearch(), USUAL
     far = tried(search, start, [5.0])
     back = tried(search, far, [1.0, 5.0, 9.0, 6.0])
     assert not search.settled
@@ -66,7 +69,7 @@ def test_a_step_that_was_too_long_goes_back_a_part_of_the_way():
 
 def test_it_ends_where_nothing_rises_along_the_step():
     """A likelihood with a kink: its slopes promise what it does not keep."""
-    search, start = NoiseSearch(), NoiseLevels()
+    search, start = NoiseSearch(), USUAL
     far = tried(search, start, [5.0])
     assert far != start
     assert tried(search, far, [1.0, 5.0, 4.0, 3.0]) == start
@@ -74,7 +77,7 @@ def test_it_ends_where_nothing_rises_along_the_step():
 
 
 def test_a_step_that_was_told_about_another_linearisation_may_fail_once():
-    search, start = NoiseSearch(), NoiseLevels()
+    search, start = NoiseSearch(), USUAL
     nothing = [1.0, 5.0, 4.0, 3.0]
     assert tried(search, tried(search, start, [5.0]), nothing, elsewhere=True) == start
     assert not search.settled
@@ -90,7 +93,7 @@ def test_levels_that_are_told_are_not_searched_for():
 
 
 def test_a_search_that_knows_no_timing_looks_for_that_alone_first():
-    start = NoiseLevels()
+    start = USUAL
     search = NoiseSearch(blind=True)
     assert search.members(start) == (start,)
     assert search.better(start, [0.0], np.zeros((1, 1)), elsewhere=True) is start
@@ -98,3 +101,38 @@ def test_a_search_that_knows_no_timing_looks_for_that_alone_first():
     assert search.members(start) == (start, *neighbours(start))
     told = NoiseSearch(blind=True, settled=True)
     assert told.members(start) == told.members(start) == (start,)
+
+
+def flown_with(accuracy):
+    n = len(accuracy)
+    segment = Segment(np.zeros(2), *np.zeros((2, 2, 3)), np.zeros(2), np.eye(3)[None], np.eye(3))
+    fixes = Fixes(np.arange(float(n)), np.zeros((n, 3)), *np.zeros((2, n)))
+    told = replace(fixes, accuracy=np.array(accuracy))
+    return Batch(segment, told, np.ones(n, dtype=bool), fresh=True)
+
+
+@pytest.mark.parametrize(
+    ("accuracies", "told"),
+    [
+        ([[0.3, 0.3], [0.3, 0.4]], True),
+        ([[0.3, 0.3], [0.4, 0.4]], True),
+        ([[0.3, 0.3], [0.3, 0.3]], False),
+        ([[0.3, np.nan], [np.nan, np.nan]], False),
+        ([[], []], False),
+    ],
+)
+def test_a_word_that_is_always_the_same_tells_nothing(accuracies, told):
+    assert ("stated" in told_by(flown_with(a) for a in accuracies)) == told
+    assert set(ESTIMATED) - set(told_by(flown_with(a) for a in accuracies)) <= {"stated"}
+
+
+def test_what_goes_with_a_word_that_tells_nothing_is_left_alone():
+    names = tuple(n for n in ESTIMATED if n != "stated")
+    start, search = NoiseLevels(), NoiseSearch(names)
+    bank = search.members(start)
+    assert all(levels.stated == 0.0 for levels in bank)
+    steep = [0.0, *(0.1 for _ in bank[1:])]
+    found = search.better(start, steep, np.eye(len(bank)))
+    assert found != start
+    assert found.stated == 0.0
+    assert all(levels.stated == 0.0 for levels in search.members(found))

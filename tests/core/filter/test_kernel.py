@@ -19,7 +19,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter import kernel
 from onboard.core.filter.innovations import Epoch, steps
 from onboard.core.filter.kernel import NUMPY, Process
-from onboard.core.filter.noise import NoiseLevels, neighbours
+from onboard.core.filter.noise import USUAL, NoiseLevels, neighbours
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
@@ -55,7 +55,8 @@ def turned(rng):
 def step_of(rng, m):
     shapes = ((3, 3), (3,), (3,), (3, 3), (3, m), (3, m), (3, m))
     integrals = (0.3 * rng.normal(size=(1, *s)) for s in shapes)
-    return steps(np.array([0.2]), *integrals, rng.uniform(0.0, 0.1, size=(1, 6)))[0]
+    missed, stated = rng.uniform(0.0, 0.1, size=(1, 6)), rng.uniform(0.1, 10.0, size=1)
+    return steps(np.array([0.2]), *integrals, missed, stated)[0]
 
 
 def process_of(rng, members):
@@ -197,7 +198,7 @@ def relative(N):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bank", [(NoiseLevels(),), neighbours(NoiseLevels())], ids=["one", "bank"])
+@pytest.mark.parametrize("bank", [(USUAL,), neighbours(USUAL)], ids=["one", "bank"])
 @pytest.mark.usefixtures("_preference_kept")
 def test_a_flight_gives_the_same_sums_either_way(engine, bank):
     def sums():
@@ -226,6 +227,8 @@ def troubled(batches):
         v_n, height = batch.fixes.v_n.copy(), batch.fixes.height.copy()
         trusted = batch.trusted.copy()
         n = len(v_n)
+        accuracy = np.where(np.arange(n) % 11 < 5, 0.9, 0.2)
+        accuracy[n // 4] = np.nan
         if i == 2:
             v_n[n // 2 : n // 2 + 5, 0] += 30.0
             trusted[3:5] = False
@@ -234,9 +237,8 @@ def troubled(batches):
             v_n[n // 2, 0] = np.nan
             height[-3:] += 80.0
             v_n[1::7, 1] += 0.6
-        out.append(
-            replace(batch, fixes=replace(batch.fixes, v_n=v_n, height=height), trusted=trusted)
-        )
+        fixes = replace(batch.fixes, v_n=v_n, height=height, accuracy=accuracy)
+        out.append(replace(batch, fixes=fixes, trusted=trusted))
     return out
 
 
@@ -247,7 +249,7 @@ def test_epoch_by_epoch_either_way_sees_the_same(engine, held):
     prior = engine.model.prior, np.diag(engine.model.prior_sigma**2)
 
     def seen():
-        made = Pass(engine.model, engine.point, (NoiseLevels(),), traces=True)
+        made = Pass(engine.model, engine.point, (USUAL,), traces=True)
         if held:
             made.hold(*prior)
         return made, [through(made, batch, 30.0) for batch in batches]
@@ -337,7 +339,7 @@ def test_two_processes_may_fill_the_same_cache(tmp_path):
 @pytest.mark.usefixtures("_preference_kept")
 def test_what_members_change_is_that_of_filters_of_their_own(engine):
     """Products of differences of whitened innovations, each member's from a filter by itself."""
-    bank = (NoiseLevels(), NoiseLevels(velocity=0.08), NoiseLevels(force_walk=0.06, jitter=0.01))
+    bank = (USUAL, NoiseLevels(velocity=0.08), NoiseLevels(force_walk=0.06, jitter=0.01))
     batch = engine.batches[1]
     # Attitude and the earth's turning are member 0's for all: held, and left out.
     free = Uses(recorded_attitude=True, earth=False)

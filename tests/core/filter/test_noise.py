@@ -16,7 +16,7 @@ from onboard.core.filter.noise import (
 )
 from onboard.core.filter.noise_step import bounded, scoring_step
 
-CENTRE = NoiseLevels()
+CENTRE = USUAL
 STIFF = 1e4
 """Of the likelihoods: what is known beforehand counts next to nothing beside it."""
 

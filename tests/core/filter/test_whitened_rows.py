@@ -161,7 +161,11 @@ LEVELS = NoiseLevels(
     heading=0.03,
     attitude_white=4e-3,
     jitter=0.02,
+    stated=0.6,
 )
+STATED = (0.2, 12.0)
+"""Square of the accuracy that the receiver states, by turns for so many fixes."""
+STATED_EPOCHS = 15
 ACCELERATION = np.array([0.0, 4.0, 0.0])
 """That the moment's jitter is multiplied by; one axis, for the filter takes axes one by one."""
 DT, SUB = 0.01, 10
@@ -180,20 +184,29 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     bias = 0.01 * normal(size=3)
     slow = np.array([levels.attitude, levels.attitude, levels.heading])
     time = levels.heading_time
-    error, colour, wander = slow * normal(size=3), levels.velocity_colour * normal(size=3), 0.0
+
+    def stated(k):
+        return STATED[k // STATED_EPOCHS % 2]
+
+    def worse(k):
+        return np.sqrt((1.0 - levels.stated) + levels.stated * stated(k))
+
+    error, wander = slow * normal(size=3), 0.0
+    colour = worse(0) * levels.velocity_colour * normal(size=3)
     turning = slow[2] / time * normal()  # rad/s, of the error of the heading
     # One unknown, which is one: the specific force itself.
     filter_ = WhiteningFilter(1, (levels,), Uses(earth=False, gates=False))
     theta = np.ones(1)
 
-    def epoch(t):
+    def epoch(k):
         read = rotation_from_vector(error + levels.attitude_white * normal(size=3)) @ R
         ned = np.zeros((7, 2))
         late = levels.jitter * normal()
-        ned[:3, 0] = v + colour + levels.velocity * normal(size=3) + late * ACCELERATION
+        white = worse(k) * levels.velocity * normal(size=3)
+        ned[:3, 0] = v + colour + white + late * ACCELERATION
         ned[3, 0] = h + wander + levels.height * normal()
         return Epoch(
-            t,
+            k * T,
             velocity=ned[:3, 0],
             height=ned[3, 0],
             latitude=0.0,
@@ -203,10 +216,11 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             along_velocity=np.zeros(1),
             trusted=True,
             moving=np.append(ACCELERATION**2, np.zeros(4)),
+            stated=stated(k),
         )
 
     filter_.start(
-        epoch(0.0), rotation_from_vector(START_SIGMA * normal(size=3)), START_SIGMA, START_SIGMA
+        epoch(0), rotation_from_vector(START_SIGMA * normal(size=3)), START_SIGMA, START_SIGMA
     )
     out = []
     for k in range(epochs):
@@ -235,16 +249,18 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             turning += driven - (2.0 * turning / time + error[2] / time**2) * DT
             error[2] += turning * DT
         keep = np.exp(-T / COLOUR_TIME_S)
-        colour = keep * colour + np.sqrt(1 - keep**2) * levels.velocity_colour * normal(size=3)
+        driven = worse(k + 1) * levels.velocity_colour * normal(size=3)
+        colour = keep * colour + np.sqrt(1 - keep**2) * driven
         wander += levels.height_walk * np.sqrt(T) * normal()
         missed = BLOW_SIGMA if k % BLOW_EVERY == 0 else np.zeros(6)
         v = v + R @ P.T @ (missed[:3] * normal(size=3))
         R = R @ P.T @ rotation_from_vector(missed[3:] * normal(size=3)) @ P
         no_turn = np.zeros((3, 1))
         integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], no_turn, missed**2)
-        step = steps(np.array([T]), *(x[None] for x in integrals))[0]
+        leads_to = np.array([stated(k + 1)])
+        step = steps(np.array([T]), *(x[None] for x in integrals), leads_to)[0]
         filter_.predict(step, theta, 0.0)
-        made = filter_.update(epoch((k + 1) * T), theta, Covariance(np.zeros((1, 1))))
+        made = filter_.update(epoch(k + 1), theta, Covariance(np.zeros((1, 1))))
         out.append(made.y[0] - made.h[0] @ theta)
     return np.array(out)
 

@@ -75,7 +75,7 @@ def test_waits_then_opens_on_the_first_good_fix_and_counts_trusted_time():
         (Distrust.NO_FIX, {"altitude": math.inf}),
         (Distrust.FEW_SATELLITES, {"satellites": 5}),
         (Distrust.HDOP, {"hdop": 3.0}),
-        (Distrust.SPEED_ACCURACY, {"speed_accuracy": 2.0}),
+        (Distrust.SPEED_ACCURACY, {"speed_accuracy": 6.0}),
     ],
 )
 def test_a_bad_fix_suspends_and_recovers_after_its_time(reason, bad):

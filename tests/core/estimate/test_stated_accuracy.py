@@ -1,0 +1,80 @@
+"""A receiver that says how accurate its velocity is: what it says weighs, as far as it is true."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from onboard.core.inputs.samples import GpsFix
+from sitl.builtin.truth import GpsTruth
+from tests.core.estimate.test_simulated_flights import TRUE, fed, flown
+
+QUIET = GpsTruth(velocity_noise=0.01, velocity_coloured=0.01)
+SKY_S = 20.0
+"""For so long the sky is good, and for as long it is not."""
+STATED_M_S = (0.3, 2.4)
+"""By turns."""
+ERROR = 0.15
+"""Of what is stated, one sigma along each axis."""
+KEPT = np.exp(-0.2 / 2.0)
+"""From fix to fix of errors that last two seconds, half of the variance; the rest is white."""
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return flown("copter", 170.0, gps=QUIET)[0]
+
+
+def overlaid(samples, *, honest, told=True, seed=0):
+    """The flight with errors of the velocity; honest: as large as is stated, else alike."""
+    rng = np.random.default_rng(seed)
+    slow, out = rng.normal(size=3), []
+    for sample in samples:
+        made = sample
+        if isinstance(sample, GpsFix):
+            stated = STATED_M_S[int(sample.t // SKY_S) % 2]
+            slow = KEPT * slow + np.sqrt(1.0 - KEPT**2) * rng.normal(size=3)
+            unit = (slow + rng.normal(size=3)) / np.sqrt(2.0)
+            n, e, d = ERROR * (stated if honest else STATED_M_S[0]) * unit
+            made = replace(
+                sample,
+                v_n=sample.v_n + n,
+                v_e=sample.v_e + e,
+                v_d=None if sample.v_d is None else sample.v_d + d,
+                speed_accuracy=stated if told else None,
+            )
+        out.append(made)
+    return out
+
+
+def answered(samples):
+    """Six errors in sigmas, their sigmas, and how much of the noise goes with what is stated."""
+    made = fed(samples)
+    got = made.calibration(1)
+    error = np.array(got.scale + got.offset) - np.array(TRUE.scale + TRUE.offset)
+    sigma = np.array(got.scale_sigma + got.offset_sigma)
+    return error / got.sigma_with_its_gyroscope, sigma, made.engine(1).noise.stated
+
+
+@pytest.mark.slow
+def test_fixes_weigh_as_much_as_they_are_worth(quiet):
+    """None is refused that says two metres a second, and the good ones count for more."""
+    samples = overlaid(quiet, honest=True)
+    off, sigma, share = answered(samples)
+    untold, widest, _ = answered(overlaid(quiet, honest=True, told=False))
+    assert share > 0.8
+    assert np.abs(off).max() < 3.5
+    assert np.abs(untold).max() < 3.5
+    # Half of the fixes are eight times as good as the others.
+    assert np.all(sigma[:3] < 0.75 * widest[:3])
+    assert "speed_accuracy" not in fed(samples).trust.rejected
+
+
+@pytest.mark.slow
+def test_a_word_that_says_nothing_is_not_believed(quiet):
+    off, sigma, share = answered(overlaid(quiet, honest=False))
+    _, without, _ = answered(overlaid(quiet, honest=False, told=False))
+    assert share < 0.1
+    assert np.abs(off).max() < 3.5
+    # Two of the others have a share in how much the parts of the flight contradict each other.
+    np.testing.assert_allclose(sigma[:2], without[:2], rtol=0.15)
