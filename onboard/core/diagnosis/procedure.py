@@ -42,6 +42,7 @@ from onboard.core.diagnosis.settling import families_of, only, settled
 from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
+from onboard.core.inputs.clock_rates import most_growth
 from onboard.core.inputs.segments import Batch
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -79,7 +80,7 @@ def examine(
     """
     engine = calibrator.engine(imu)
     flight = since_reboot(engine.batches, since) if latest else list(engine.batches)
-    origin = _origin(calibrator, imu, flight if latest else ())
+    origin = _origin(calibrator, imu, flight, latest=latest)
     clear = cleared(calibrator, engine, flight, origin, beside)
     companions = _companions(calibrator, imu, clear, latest=latest, since=since)
     full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
@@ -117,15 +118,16 @@ def examine(
     )
 
 
-def _origin(calibrator: Calibrator, imu: int, latest: Sequence[Batch]) -> Origin:
-    """What effects count from: the first sample of all, or of ``latest`` if there is any."""
+def _origin(calibrator: Calibrator, imu: int, flight: Sequence[Batch], *, latest: bool) -> Origin:
+    """What effects count from: the first sample of all, or that of the ``latest`` flight."""
     x, y, z = (float(a) for a in calibrator.parameters.antenna)
     return Origin(
-        t0=float(latest[0].segment.t[0]) if latest else calibrator.first_sample,
+        t0=float(flight[0].segment.t[0]) if latest and flight else calibrator.first_sample,
         antenna=(x, y, z),
         trim=calibrator.parameters.trim,
         imu=imu,
         receiver=calibrator.parameters.receiver,
+        latency_growth=most_growth(since_reboot(flight)),
     )
 
 

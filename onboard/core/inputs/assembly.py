@@ -259,6 +259,7 @@ def _fixes(taken: Sequence[GpsFix], t: Array) -> Fixes:
         np.array([f.latitude for f in taken]),
         t - np.array([f.t if f.t_message is None else f.t_message for f in taken]),
         np.array([f.speed_accuracy or np.nan for f in taken]),
+        np.array([np.nan if f.t_receiver is None else f.t_receiver for f in taken]),
     )
 
 

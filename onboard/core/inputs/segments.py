@@ -47,6 +47,8 @@ class Fixes:
             receiver's latency, s; empty where that is not known to differ.
         accuracy: (n,) of the velocity by the receiver's own word, m/s; NaN where it says nothing,
             empty where it never does.
+        own: (n,) the receiver's own time of each, s, from any origin; NaN where it is not known,
+            empty where it never is.
     """
 
     t: Array
@@ -55,6 +57,7 @@ class Fixes:
     latitude: Array
     late: Array = field(default_factory=lambda: np.zeros(0))
     accuracy: Array = field(default_factory=lambda: np.zeros(0))
+    own: Array = field(default_factory=lambda: np.zeros(0))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -69,6 +72,7 @@ class Fixes:
             self.latitude[cut],
             self.late[cut],
             self.accuracy[cut],
+            self.own[cut],
         )
 
 

@@ -72,6 +72,8 @@ class Origin:
         trim: AHRS_TRIM, rad.
         imu: which accelerometer, from 1.
         receiver: of GPS, from 1.
+        latency_growth: by how much a latency can grow by the stamps of the fixes, a sigma, s a
+            second; None where nobody knows.
     """
 
     t0: float
@@ -80,6 +82,7 @@ class Origin:
     trim: tuple[float, float, float] = (0.0, 0.0, 0.0)
     imu: int = 1
     receiver: int = 1
+    latency_growth: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

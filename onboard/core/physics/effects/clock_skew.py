@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Final
+
 import numpy as np
 
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics import response_curves as curves
-from onboard.core.physics.effect import Bearing, Effect
+from onboard.core.physics.effect import Bearing, Effect, Origin
 from onboard.core.physics.finding import Finding
 from onboard.core.physics.wording import first, measured
 
 PARTS_PER_MILLION = 1e6
+MOST: Final = 3e-3
+"""A sigma of what drivers, transports and logs of two clocks make of a rate; where a receiver's
+own time is known, its stamps say [cost]."""
 
 
 class ClockSkew(Effect):
@@ -30,8 +36,15 @@ class ClockSkew(Effect):
     of_flight = True
     keys = ("rate",)
     plausible = (0.01,)
-    unknowns = (Unknown("clock_rate", "1", 0.0, 3e-3),)
+    unknowns = (Unknown("clock_rate", "1", 0.0, MOST),)
     response = curves.Response("time", "s", "GPS late by", "ms", curves.time, lambda x, _: 1e3 * x)
+
+    def __init__(self, origin: Origin) -> None:
+        """Take what it counts from, and what stamps leave room for."""
+        super().__init__(origin)
+        if origin.latency_growth is not None:
+            (rate,) = self.unknowns
+            self.unknowns = (replace(rate, prior_sigma=min(origin.latency_growth, MOST)),)
 
     def velocity(self, around: Around) -> Direct:
         """``-a (t - t0)``, at the antenna, averaged as the velocity is."""
