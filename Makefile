@@ -20,11 +20,14 @@ $(STAMP): pyproject.toml requirements.lock
 demo: $(STAMP)
 	$(BIN)/onboard demo $(ARGS)
 
-# A process for each core, a file of tests in one of them; ARGS="-n 0" runs all in one.  The matrices
-# are small: threads of the linear algebra would only be in each other's way.  Without compiled tests
-# on disk, each process would spend seconds on compiling them anew.
+# A process for each core and one more, for services, browsers and brokers are waited for; a file of
+# tests in one of them; ARGS="-n 0" runs all in one.  The matrices are small: threads of the linear
+# algebra would only be in each other's way.  Without compiled tests on disk, each process would
+# spend seconds on compiling them anew.
+WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+
 test: $(STAMP)
-	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
+	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile $(ARGS)
 
 # The loops that numba compiles, once: else each process of the first tests spends half a minute on
 # the same.
