@@ -107,6 +107,7 @@ LOOKS: tuple[str, ...] = (
     "a heading that is set anew not followed, time and walk of its error found, or as it was",
     "an EKF followed along the flight, its own sensors and antenna unknowns of it, or a loop",
     "what surely improves is a calibration, after 30 s and of hovers too, or as it was",
+    "what a receiver states of its accuracy weighs, or a gate at 1.5 m/s",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (
