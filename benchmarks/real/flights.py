@@ -25,6 +25,7 @@ from onboard.core.estimate.mean_force import in_the_mean
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.solution import Solution
 from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.noise import STATED
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
@@ -41,8 +42,8 @@ AT_LIMIT = 0.01
 """A level is at an end within this share of it."""
 FLOORLESS = frozenset({"vertical", "heading_time"})
 """Levels whose lower end is a lowest value, not what no flight is without."""
-WHOLE = frozenset({"stated"})
-"""Shares: none or all of it is an answer, not an end of a range."""
+POWERS = frozenset(STATED)
+"""None at all is an answer, not an end of a range."""
 
 
 STANDS_S = 2.0
@@ -149,7 +150,7 @@ class Fit:
 
     def _at_ends(self) -> Iterator[tuple[str, bool]]:
         for name, level in self.levels.items():
-            if name in WHOLE:
+            if name in POWERS:
                 continue
             low, high = LIMITS[name]
             if level <= low * (1.0 + AT_LIMIT) or level >= high * (1.0 - AT_LIMIT):

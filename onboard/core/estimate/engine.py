@@ -33,7 +33,7 @@ from onboard.core.estimate.noise_search import NoiseSearch, told_by
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
-from onboard.core.filter.noise import USUAL, NoiseLevels, log_prior
+from onboard.core.filter.noise import STATED, USUAL, NoiseLevels, log_prior
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
@@ -274,7 +274,8 @@ class Engine:
         names = told_by(batch for part in sample for batch in part)
         search = NoiseSearch(names, settled=not levels, blind=self._seed is None)
         if levels and "stated" in names and not self.noise.stated:
-            self.noise = replace(self.noise, stated=USUAL.stated)
+            usual = {name: getattr(USUAL, name) for name in STATED}
+            self.noise = replace(self.noise, **usual)
         highest, best, idle = -math.inf, (self.point, self.noise), 0
         elsewhere = False
         for turn in range(MOST_ROUNDS):

@@ -10,6 +10,7 @@ from onboard.core.estimate.limits import WORTH_A_SEARCH
 from onboard.core.filter.limits import SHARES
 from onboard.core.filter.noise import (
     ESTIMATED,
+    STATED,
     NoiseLevels,
     between,
     log_prior,
@@ -28,7 +29,7 @@ def told_by(batches: Iterable[Batch]) -> tuple[str, ...]:
     stated = [b.fixes.accuracy[np.isfinite(b.fixes.accuracy)] for b in batches]
     if stated and len(np.unique(np.concatenate(stated))) > 1:
         return ESTIMATED
-    return tuple(name for name in ESTIMATED if name != "stated")
+    return tuple(name for name in ESTIMATED if name not in STATED)
 
 
 class NoiseSearch:

@@ -119,7 +119,8 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "heading_walk": (5e-5, 0.03),
     "attitude_white": (3e-5, 0.03),
     "jitter": (3e-4, 0.2),
-    "stated": (0.01, 1.0),
+    "stated": (0.01, 2.0),
+    "stated_colour": (0.01, 2.0),
 }
 """Floors and highest noise levels, units of :class:`~onboard.core.filter.noise.NoiseLevels`.
 
@@ -134,8 +135,9 @@ sheets].  They are there for simulations without noise, which must not make the 
 timing, interpolation and filters are modelled to the last digit.  A gyroscope's bias wanders by
 3e-3 rad/s in a second at the most, where vibration is rectified and changes with the throttle
 [physics]; the jitter of a velocity's moment is at least that of whole milliseconds, and at most the
-time between two fixes, five a second being the fewest that ArduPilot flies with [physics].  A share
-is a hundredth or all of it [bound].
+time between two fixes, five a second being the fewest that ArduPilot flies with [physics].  Errors
+that go with more than the square of the accuracy that is stated, powers of two, are not told apart
+from fixes that are worth nothing [bound].
 Velocities down are as good as those north and east but for a factor of ten, and a heading that is
 off for longer than ten minutes is off for the flight [physics].
 
@@ -147,6 +149,8 @@ levelled with.  So with the heading, whose error goes with the manoeuvre, too: t
 have one degree, and then offsets of simulated copters err by 2 sigma, with three by 1.4, which was
 1.5 before its error was smooth [tuned on simulated flights; held by ArduPilot's recordings and
 sealed ones, which it was not made from]."""
+LEAST_VELOCITY_VAR: Final = LIMITS["velocity"][0] ** 2
+"""(m/s)^2; white noise becomes no less than this by what a receiver states of it: see there."""
 USUAL_SIGMA: Final = math.log(10.0)
 """Log ratio between a level and the usual one, one sigma: no more than its order of magnitude is
 known.  [Tuned on flights for building: with a factor of three the jitter of a receiver with one fix

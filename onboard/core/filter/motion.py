@@ -75,7 +75,7 @@ def carry(
     settled: Array,
     times: Array,
     heading_time: Array,
-    share: Array,
+    powers: Array,
     stated: float,
     gravity: float,
     earth: int,
@@ -111,7 +111,7 @@ def carry(
         for i in range(MEASURED - 1):
             driven = settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
             if i < 3:
-                driven *= 1.0 + share[b] * (stated - 1.0)
+                driven *= stated ** powers[b, 1]
             after[b, ERRORS + i] += driven
     predict(carried, R_nb, T, moved, columns, missed, fall, decay, swing, before, after)
     for i in range(3):

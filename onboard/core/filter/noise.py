@@ -43,8 +43,8 @@ class NoiseLevels:
             (:data:`~onboard.core.filter.limits.STAMP_JITTER_S`) makes of a turn, rad.
         jitter: white noise of the moment that a GPS velocity is of, s: each component errs by as
             much of the acceleration (that they err together is left out).
-        stated: share of the variances of the velocity, white and coloured, that goes with the
-            square of the accuracy that the receiver states; none where that tells nothing.
+        stated: power of the accuracy that the receiver states with which the velocity's white noise
+            goes, and ``stated_colour`` its colour; none where that tells nothing.
     """
 
     velocity: float = 0.05
@@ -62,6 +62,7 @@ class NoiseLevels:
     attitude_white: float = 5e-4
     jitter: float = 3e-3
     stated: float = 0.0
+    stated_colour: float = 0.0
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""
@@ -78,7 +79,7 @@ class NoiseLevels:
         )
 
 
-USUAL = NoiseLevels(stated=0.5)
+USUAL = NoiseLevels(stated=0.5, stated_colour=0.5)
 """Levels that a flight is expected to have."""
 
 ESTIMATED = (
@@ -97,9 +98,11 @@ ESTIMATED = (
     "attitude_white",
     "jitter",
     "stated",
+    "stated_colour",
 )
 
-NO_VARIANCES = ("vertical", "heading_time", "stated")
+STATED = ("stated", "stated_colour")
+NO_VARIANCES = ("vertical", "heading_time", *STATED)
 """Those of :data:`ESTIMATED` that are no standard deviation or density of noise."""
 
 

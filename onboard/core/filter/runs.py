@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.filter.limits import LEAST_VELOCITY_VAR
 from onboard.core.filter.loops import measured, take, take_noise, whiten
 from onboard.core.filter.motion import angle_of, carry, mean, turn_by
 from onboard.core.filter.readings import Index
@@ -73,7 +74,7 @@ def _spread(ned: Array, acting: Index, m1: int) -> Array:
 
 @part
 def _sum(
-    white: Array, more: Array, jitter: Array, moving: Array, share: Array, stated: float
+    white: Array, more: Array, jitter: Array, moving: Array, powers: Array, stated: float
 ) -> Array:
     """Variances (B, n) and what an epoch (n,) adds to them, as ``Variances.of_reading``."""
     out = np.empty(white.shape)
@@ -81,7 +82,8 @@ def _sum(
         for i in range(len(more)):
             out[b, i] = white[b, i]
             if i < 3:
-                out[b, i] *= 1.0 + share[b] * (stated - 1.0)
+                least = min(out[b, i], LEAST_VELOCITY_VAR)
+                out[b, i] = max(out[b, i] * stated ** powers[b, 0], least)
             out[b, i] += more[i] + jitter[b] * moving[i]
     return out
 
@@ -126,7 +128,7 @@ def _note(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
     " f8[:,:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1],"
     " f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1],"
-    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, i8, i8,"
+    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -159,7 +161,7 @@ def run(
     jitter: Array,
     times: Array,
     heading_time: Array,
-    share: Array,
+    powers: Array,
     tails: Array,
     gravity: float,
     earth: int,
@@ -206,7 +208,7 @@ def run(
         jitter: see there.
         times: (2,) of the slow errors of velocity and tilt, s.
         heading_time: (B,) of that of the heading, s.
-        share: (B,) of the velocity's variances that goes with ``stated``.
+        powers: (B, 2) of ``stated`` with which the velocity's variances go.
         tails: (4,) by degrees of freedom.
         gravity: m/s^2.
         earth: whether it turns.
@@ -242,7 +244,7 @@ def run(
             settled,
             times,
             heading_time,
-            share,
+            powers,
             leads_to[k],
             gravity,
             earth,
@@ -261,7 +263,7 @@ def run(
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
         E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
         var = np.empty((members, r))
-        reads = _sum(white, noise[e], jitter, moving[e], share, stated[e])
+        reads = _sum(white, noise[e], jitter, moving[e], powers, stated[e])
         if whiten(carried, z, number, reads, E, W, whitener, var):
             return 1
         if not _ordinary(W, theta, offered[e], tails):

@@ -8,6 +8,7 @@ import numpy as np
 
 from onboard.core.filter.limits import (
     BIAS_START_RAD_S,
+    LEAST_VELOCITY_VAR,
     UNKNOWN_DOWN_START_M_S,
     UNKNOWN_HEIGHT_VAR,
 )
@@ -39,7 +40,8 @@ class Variances:
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
         jitter: (B,) of the moment that a velocity is of, s^2.
         heading_time: (B,) time of the heading's smooth error, s.
-        stated: (B,) share of the velocity's variances that goes with what the receiver states.
+        stated: (B, 2) powers with which the velocity's variances, of white noise and of colour, go
+            with the square of what the receiver states.
     """
 
     __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "stated", "walk")
@@ -53,7 +55,7 @@ class Variances:
         self.reading = np.zeros((B, MEASURED))
         self.jitter = np.array([q.jitter**2 for q in bank])
         self.heading_time = np.array([q.heading_time for q in bank])
-        self.stated = np.array([q.stated for q in bank])
+        self.stated = np.array([(q.stated, q.stated_colour) for q in bank])
         for i, q in enumerate(bank):
             self.walk[i, V] = q.force_walk**2
             self.walk[i, CH] = q.height_walk**2
@@ -80,13 +82,14 @@ class Variances:
             stated: see there.
         """
         out = self.reading.copy()
-        out[:, V] *= self.times(stated)[:, None]
+        least = np.minimum(out[:, V], LEAST_VELOCITY_VAR)
+        out[:, V] = np.maximum(out[:, V] * self.times(stated)[:, :1], least)
         out += noise + self.jitter[:, None] * moving
         return out
 
     def times(self, stated: float) -> Array:
-        """(B,) how many times its usual variance a velocity has; ``stated`` as in the epoch."""
-        out: Array = 1.0 + self.stated * (stated - 1.0)
+        """(B, 2) times the usual variance, of white noise and of colour; ``stated`` of an epoch."""
+        out: Array = stated**self.stated
         return out
 
     def at_start(
@@ -102,10 +105,10 @@ class Variances:
             height: whether its height is used.
         """
         B = len(self.reading)
-        times = self.times(stated)[:, None]
-        colour = self.settled[:, V] * times
+        times = self.times(stated)
+        colour = self.settled[:, V] * times[:, 1:]
         var = np.zeros((B, STATES))
-        var[:, V] = self.reading[:, V] * times
+        var[:, V] = self.reading[:, V] * times[:, :1]
         if not down:
             var[:, 2] = UNKNOWN_DOWN_START_M_S**2
         var[:, H] = self.reading[:, H] if height else UNKNOWN_HEIGHT_VAR
@@ -142,6 +145,6 @@ class Variances:
         before = self.walk * (0.5 * duration)
         after = before.copy()
         driven = self.settled * (1.0 - decay * decay)
-        driven[:, V] *= self.times(stated)[:, None]
+        driven[:, V] *= self.times(stated)[:, 1:]
         after[:, ERRORS:HEADING] += driven[:, :-1]
         return before, after

@@ -246,7 +246,7 @@ class WhiteningFilter:
                     theta,
                     uncertainty,
                     made.whitener,
-                    wider=math.sqrt(self.variances.times(epoch.stated)[0]),
+                    wider=math.sqrt(self.variances.times(epoch.stated)[0].max()),
                     velocity=known,
                 )
             if refusal is None:

@@ -228,7 +228,7 @@ def troubled(batches):
         trusted = batch.trusted.copy()
         n = len(v_n)
         accuracy = np.where(np.arange(n) % 11 < 5, 0.9, 0.2)
-        accuracy[n // 4] = np.nan
+        accuracy[n // 4], accuracy[n // 5] = np.nan, 1e-4
         if i == 2:
             v_n[n // 2 : n // 2 + 5, 0] += 30.0
             trusted[3:5] = False

@@ -162,6 +162,7 @@ LEVELS = NoiseLevels(
     attitude_white=4e-3,
     jitter=0.02,
     stated=0.6,
+    stated_colour=1.1,
 )
 STATED = (0.2, 12.0)
 """Square of the accuracy that the receiver states, by turns for so many fixes."""
@@ -188,11 +189,8 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     def stated(k):
         return STATED[k // STATED_EPOCHS % 2]
 
-    def worse(k):
-        return np.sqrt((1.0 - levels.stated) + levels.stated * stated(k))
-
     error, wander = slow * normal(size=3), 0.0
-    colour = worse(0) * levels.velocity_colour * normal(size=3)
+    colour = stated(0) ** (levels.stated_colour / 2) * levels.velocity_colour * normal(size=3)
     turning = slow[2] / time * normal()  # rad/s, of the error of the heading
     # One unknown, which is one: the specific force itself.
     filter_ = WhiteningFilter(1, (levels,), Uses(earth=False, gates=False))
@@ -202,7 +200,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         read = rotation_from_vector(error + levels.attitude_white * normal(size=3)) @ R
         ned = np.zeros((7, 2))
         late = levels.jitter * normal()
-        white = worse(k) * levels.velocity * normal(size=3)
+        white = stated(k) ** (levels.stated / 2) * levels.velocity * normal(size=3)
         ned[:3, 0] = v + colour + white + late * ACCELERATION
         ned[3, 0] = h + wander + levels.height * normal()
         return Epoch(
@@ -249,7 +247,8 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             turning += driven - (2.0 * turning / time + error[2] / time**2) * DT
             error[2] += turning * DT
         keep = np.exp(-T / COLOUR_TIME_S)
-        driven = worse(k + 1) * levels.velocity_colour * normal(size=3)
+        size = stated(k + 1) ** (levels.stated_colour / 2) * levels.velocity_colour
+        driven = size * normal(size=3)
         colour = keep * colour + np.sqrt(1 - keep**2) * driven
         wander += levels.height_walk * np.sqrt(T) * normal()
         missed = BLOW_SIGMA if k % BLOW_EVERY == 0 else np.zeros(6)
