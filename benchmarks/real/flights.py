@@ -42,8 +42,8 @@ AT_LIMIT = 0.01
 """A level is at an end within this share of it."""
 FLOORLESS = frozenset({"vertical", "heading_time"})
 """Levels whose lower end is a lowest value, not what no flight is without."""
-POWERS = frozenset(STATED)
-"""None at all is an answer, not an end of a range."""
+NO_ENDS = frozenset({*STATED, "usually_stated"})
+"""Powers, of which none at all is an answer, and what they are of."""
 
 
 STANDS_S = 2.0
@@ -150,7 +150,7 @@ class Fit:
 
     def _at_ends(self) -> Iterator[tuple[str, bool]]:
         for name, level in self.levels.items():
-            if name in POWERS:
+            if name in NO_ENDS:
                 continue
             low, high = LIMITS[name]
             if level <= low * (1.0 + AT_LIMIT) or level >= high * (1.0 - AT_LIMIT):

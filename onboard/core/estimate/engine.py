@@ -29,11 +29,17 @@ from onboard.core.estimate.limits import (
     STEADY,
     WORTH_A_SEARCH,
 )
-from onboard.core.estimate.noise_search import NoiseSearch, told_by
+from onboard.core.estimate.noise_search import UNTOLD, NoiseSearch, usually_stated
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
-from onboard.core.filter.noise import STATED, USUAL, NoiseLevels, log_prior
+from onboard.core.filter.noise import (
+    ESTIMATED,
+    STATED,
+    USUAL,
+    NoiseLevels,
+    log_prior,
+)
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
@@ -271,11 +277,12 @@ class Engine:
         """
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
-        names = told_by(batch for part in sample for batch in part)
+        usually = usually_stated(batch for part in sample for batch in part)
+        names = UNTOLD if usually is None else ESTIMATED
         search = NoiseSearch(names, settled=not levels, blind=self._seed is None)
-        if levels and "stated" in names and not self.noise.stated:
-            usual = {name: getattr(USUAL, name) for name in STATED}
-            self.noise = replace(self.noise, **usual)
+        if levels and usually is not None:
+            powers = {name: getattr(self.noise, name) or getattr(USUAL, name) for name in STATED}
+            self.noise = replace(self.noise, **powers, usually_stated=usually)
         highest, best, idle = -math.inf, (self.point, self.noise), 0
         elsewhere = False
         for turn in range(MOST_ROUNDS):

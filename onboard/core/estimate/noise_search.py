@@ -21,15 +21,20 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
 
-def told_by(batches: Iterable[Batch]) -> tuple[str, ...]:
-    """Levels that a flight can say anything of.
+def usually_stated(batches: Iterable[Batch]) -> float | None:
+    """Accuracy of a velocity that a receiver states in the mean of logarithms, m/s.
 
-    What goes with the accuracy that a receiver states is not told where that is always the same.
+    None where it is always the same, or nothing: what goes with it is not told then.
     """
     stated = [b.fixes.accuracy[np.isfinite(b.fixes.accuracy)] for b in batches]
-    if stated and len(np.unique(np.concatenate(stated))) > 1:
-        return ESTIMATED
-    return tuple(name for name in ESTIMATED if name not in STATED)
+    all_ = np.concatenate(stated or [np.zeros(0)])
+    if len(np.unique(all_)) < 2:
+        return None
+    return float(np.exp(np.log(all_).mean()))
+
+
+UNTOLD = tuple(name for name in ESTIMATED if name not in STATED)
+"""Levels that a flight tells in which a receiver states nothing."""
 
 
 class NoiseSearch:

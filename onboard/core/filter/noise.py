@@ -15,7 +15,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from onboard.core.filter.limits import LIMITS, NUDGE, USUAL_SIGMA
+from onboard.core.filter.limits import LIMITS, NUDGE, STATED_M_S, USUAL_SIGMA
 from onboard.core.maths.arrays import Array
 
 
@@ -45,6 +45,8 @@ class NoiseLevels:
             much of the acceleration (that they err together is left out).
         stated: power of the accuracy that the receiver states with which the velocity's white noise
             goes, and ``stated_colour`` its colour; none where that tells nothing.
+        usually_stated: accuracy that both are of, m/s.  It is none of the levels to be found: about
+            what the flight usually has, sizes and powers do not stand in for each other.
     """
 
     velocity: float = 0.05
@@ -63,6 +65,7 @@ class NoiseLevels:
     jitter: float = 3e-3
     stated: float = 0.0
     stated_colour: float = 0.0
+    usually_stated: float = STATED_M_S
 
     def scaled(self, name: str, factor: float) -> NoiseLevels:
         """One level times ``factor``, inside its limits."""

@@ -9,6 +9,7 @@ import numpy as np
 from onboard.core.filter.limits import (
     BIAS_START_RAD_S,
     LEAST_VELOCITY_VAR,
+    STATED_M_S,
     UNKNOWN_DOWN_START_M_S,
     UNKNOWN_HEIGHT_VAR,
 )
@@ -62,6 +63,10 @@ class Variances:
             velocity = np.array([1.0, 1.0, q.vertical**2])
             self.settled[i, V] = q.velocity_colour**2 * velocity
             self.reading[i, V] = q.velocity**2 * velocity
+            # What is stated is told over the same number for all.
+            usual = (STATED_M_S / q.usually_stated) ** (2.0 * self.stated[i])
+            self.reading[i, V] *= usual[0]
+            self.settled[i, V] *= usual[1]
             self.reading[i, H] = q.height**2
             self.reading[i, PSI] = q.attitude_white**2
             if attitude:
