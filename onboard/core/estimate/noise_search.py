@@ -26,11 +26,12 @@ def usually_stated(batches: Iterable[Batch]) -> float | None:
 
     None where it is always the same, or nothing: what goes with it is not told then.
     """
-    stated = [b.fixes.accuracy[np.isfinite(b.fixes.accuracy)] for b in batches]
-    all_ = np.concatenate(stated or [np.zeros(0)])
-    if len(np.unique(all_)) < 2:
+    said = [b.fixes.accuracy[b.trusted] for b in batches if len(b.fixes.accuracy)]
+    stated = np.concatenate(said or [np.zeros(0)])
+    stated = stated[np.isfinite(stated)]
+    if len(np.unique(stated)) < 2:
         return None
-    return float(np.exp(np.log(all_).mean()))
+    return float(np.exp(np.log(stated).mean()))
 
 
 UNTOLD = tuple(name for name in ESTIMATED if name not in STATED)

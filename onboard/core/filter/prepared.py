@@ -79,7 +79,7 @@ def prepare(
     epoch_t = point.true_time(fixes.t)
     maker = NodeMaker(segment, bias_b, point.six, recorded_attitude=recorded_attitude)
     start, end, measured, leads_to = _subdivide(epoch_t)
-    stated = _stated(fixes)
+    stated = _stated(fixes, trusted)
     intervals = maker.intervals(start, end)
     near = around(maker, epoch_t, point.window, np.array(point.antenna), np.array(point.shapes))
     regressors = model.regressors(intervals, near)
@@ -90,11 +90,17 @@ def prepare(
     )
 
 
-def _stated(fixes: Fixes) -> Array:
-    """(n,) as in :class:`~onboard.core.filter.innovations.Epoch`."""
-    if not len(fixes.accuracy):
-        return np.ones(len(fixes))
-    return np.where(np.isfinite(fixes.accuracy), (fixes.accuracy / STATED_M_S) ** 2, 1.0)
+def _stated(fixes: Fixes, trusted: NDArray[np.bool_]) -> Array:
+    """(n,) as in :class:`~onboard.core.filter.innovations.Epoch`.
+
+    A fix that is not believed says nothing: what a receiver without satellites states, hundreds of
+    metres a second, is no error that the next good fix would still have.
+    """
+    out = np.ones(len(fixes))
+    if len(fixes.accuracy):
+        said = trusted & np.isfinite(fixes.accuracy)
+        out[said] = (fixes.accuracy[said] / STATED_M_S) ** 2
+    return out
 
 
 def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_], NDArray[np.int_]]:

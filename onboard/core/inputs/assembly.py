@@ -258,9 +258,14 @@ def _fixes(taken: Sequence[GpsFix], t: Array) -> Fixes:
         np.array([f.altitude for f in taken]),
         np.array([f.latitude for f in taken]),
         t - np.array([f.t if f.t_message is None else f.t_message for f in taken]),
-        np.array([f.speed_accuracy or np.nan for f in taken]),
+        np.array([_positive(f.speed_accuracy) for f in taken]),
         np.array([np.nan if f.t_receiver is None else f.t_receiver for f in taken]),
     )
+
+
+def _positive(accuracy: float | None) -> float:
+    """NaN for what is no accuracy: none, nothing, less than that."""
+    return accuracy if accuracy is not None and accuracy > 0.0 else np.nan
 
 
 def _moves(imu: int, live: dict[int, ImuTrack], fixes: Fixes, start: float, end: float) -> bool:

@@ -126,6 +126,12 @@ def test_a_word_that_is_always_the_same_tells_nothing(accuracies, usual):
     assert usually_stated(flown_with(a) for a in accuracies) == pytest.approx(usual)
 
 
+def test_what_a_fix_states_that_is_not_believed_is_not_heard():
+    batch = flown_with([0.2, 0.8, 500.0])
+    heard = replace(batch, trusted=np.array([True, True, False]))
+    assert usually_stated([heard]) == pytest.approx(0.4)
+
+
 def test_what_goes_with_a_word_that_tells_nothing_is_left_alone():
     start, search = NoiseLevels(), NoiseSearch(UNTOLD)
     bank = search.members(start)

@@ -108,3 +108,25 @@ def test_fixes_that_are_worth_little_do_no_harm(quiet):
     assert "speed_accuracy" in fed(without).trust.rejected
     assert np.abs(off).max() < 3.5
     assert np.all(sigma < 1.1 * refused)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nonsense", [600.0, 4e9, -1.0, 1e-9])
+def test_what_is_stated_without_satellites_is_forgotten_with_them(quiet, nonsense):
+    """Ten seconds without a fix, and whatever is stated meanwhile."""
+    first = next(s.t for s in quiet if isinstance(s, GpsFix))
+
+    def poor(sample, accuracy):
+        if isinstance(sample, GpsFix) and 80.0 < sample.t - first < 90.0:
+            return replace(sample, fix_type=1, satellites=2, speed_accuracy=accuracy)
+        return sample
+
+    def varied(sample):
+        if not isinstance(sample, GpsFix):
+            return sample
+        return replace(sample, speed_accuracy=0.3 if int(sample.t) % 2 else 0.31)
+
+    off, sigma, _ = answered([poor(varied(s), nonsense) for s in quiet])
+    _, usual, _ = answered([poor(varied(s), 0.3) for s in quiet])
+    assert np.abs(off).max() < 3.5
+    np.testing.assert_allclose(sigma, usual, rtol=1e-3)
