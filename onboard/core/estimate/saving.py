@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.noise import STATED, NoiseLevels
 from onboard.core.maths.arrays import Vector3, vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
@@ -113,8 +113,10 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
     if not blocks:
         raise StateError("saved state is damaged: an accelerometer without sums")
     noise = NoiseLevels(**{k: _finite(v) for k, v in e["noise"].items()})
-    if min(asdict(noise).values()) <= 0.0:
-        raise StateError("saved state is damaged: noise levels that are not positive")
+    for name, level in asdict(noise).items():
+        # Nothing goes with what a receiver states that tells nothing.
+        if level < 0.0 or (level == 0.0 and name not in STATED):
+            raise StateError("saved state is damaged: noise levels that are not positive")
     return SavedEngine(
         int(e["imu"]),
         None if e["device_id"] is None else _finite(e["device_id"]),
