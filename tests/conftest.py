@@ -55,12 +55,10 @@ def pytest_collection_finish() -> None:
     """What is there now stays: six thousand tests and all modules, half a million objects.
 
     The collector of garbage would look through them again and again, a tenth of the time of tests
-    that make many objects.  What tests make is collected as ever, only not every 700 objects: a
-    flight is a quarter of a million, and none of them is garbage before its end.
+    that make many objects.  What tests make is collected as ever.
     """
     gc.collect()
     gc.freeze()
-    gc.set_threshold(100_000, 20, 20)
 
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:
