@@ -215,7 +215,8 @@ async def test_viewers_are_bounded_and_leaving_makes_room():
         async with asyncio.timeout(20):
             while (viewer := await _viewer(client)) is None:
                 pass
-        await viewer.close()
+        for leaving in (*viewers, viewer):
+            await leaving.close()
 
 
 async def test_a_viewer_that_reads_nothing_is_let_go_and_keeps_nobody_waiting(monkeypatch):
