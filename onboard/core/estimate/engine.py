@@ -29,17 +29,11 @@ from onboard.core.estimate.limits import (
     STEADY,
     WORTH_A_SEARCH,
 )
-from onboard.core.estimate.noise_search import UNTOLD, NoiseSearch, usually_stated
+from onboard.core.estimate.noise_search import NoiseSearch, levels_told
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.solution import Solution, solve
 from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
-from onboard.core.filter.noise import (
-    ESTIMATED,
-    STATED,
-    USUAL,
-    NoiseLevels,
-    log_prior,
-)
+from onboard.core.filter.noise import NoiseLevels, log_prior
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
@@ -277,22 +271,17 @@ class Engine:
         """
         at, ready = self.point, Preparations()
         sample = [self.batches] if self.sample is None else self.sample
-        usually = usually_stated(batch for part in sample for batch in part)
-        names = UNTOLD if usually is None else ESTIMATED
+        begin, names = levels_told(self.noise, (batch for part in sample for batch in part))
+        self.noise = begin if levels else self.noise
         search = NoiseSearch(names, settled=not levels, blind=self._seed is None)
-        if levels and usually is not None:
-            powers = {name: getattr(self.noise, name) or getattr(USUAL, name) for name in STATED}
-            self.noise = replace(self.noise, **powers, usually_stated=usually)
-        highest, best, idle = -math.inf, (self.point, self.noise), 0
-        elsewhere = False
+        highest, best, idle, elsewhere = -math.inf, (self.point, self.noise), 0, False
         for turn in range(MOST_ROUNDS):
             made = self._new_pass(search.members(self.noise), ready)
             results = self._over(sample, made)
             self._seed = solve([result.block for result in results], self.model)
             if turn == 0:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
-            likelihoods = made.log_likelihoods()
-            likely = likelihoods[0] + log_prior(self.noise, names)
+            likely = (likelihoods := made.log_likelihoods())[0] + log_prior(self.noise, names)
             idle = idle + 1 if likely < highest + WORTH_A_SEARCH else 0
             if likely > highest:
                 highest, best = likely, (self.point, self.noise)

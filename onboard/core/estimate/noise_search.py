@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from onboard.core.filter.limits import SHARES
 from onboard.core.filter.noise import (
     ESTIMATED,
     STATED,
+    USUAL,
     NoiseLevels,
     between,
     log_prior,
@@ -36,6 +38,17 @@ def usually_stated(batches: Iterable[Batch]) -> float | None:
 
 UNTOLD = tuple(name for name in ESTIMATED if name not in STATED)
 """Levels that a flight tells in which a receiver states nothing."""
+
+
+def levels_told(
+    levels: NoiseLevels, batches: Iterable[Batch]
+) -> tuple[NoiseLevels, tuple[str, ...]]:
+    """Where a search begins from ``levels``, and the names of those that the flight tells."""
+    usually = usually_stated(batches)
+    if usually is None:
+        return levels, UNTOLD
+    powers = {name: getattr(levels, name) or getattr(USUAL, name) for name in STATED}
+    return replace(levels, **powers, usually_stated=usually), ESTIMATED
 
 
 class NoiseSearch:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from onboard.core.filter.innovation_gates import InnovationGates, tails
+from onboard.core.filter.innovation_gates import GateRefusal, InnovationGates, tails
 from onboard.core.filter.innovations import Epoch, Step, WhitenedInnovations
 from onboard.core.filter.kernel import (
     Process,
@@ -233,24 +233,10 @@ class WhiteningFilter:
         white = self.variances.of_reading(epoch.noise, epoch.moving, epoch.stated)
         while kinds:
             made = self.kernel.whiten(self.carried, z, reading(kinds), white)
-            refusal = None
-            if self.gates is not None:
-                y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
-                known = None if self.uses.refused is None else self.uses.refused.by(epoch.stamp)
-                refusal = self.gates.judge(
-                    epoch.t,
-                    kinds,
-                    made.E,
-                    y,
-                    h,
-                    theta,
-                    uncertainty,
-                    made.whitener,
-                    wider=math.sqrt(self.variances.times(epoch.stated)[0].max()),
-                    velocity=known,
-                )
+            refusal = self._refusal(epoch, kinds, made, theta, uncertainty)
             if refusal is None:
                 if self.gates is not None:
+                    y, h = made.W[0, :, 0], made.W[0, :, 1 : self._m1]
                     wider = tails(kinds, y - h @ theta, h, uncertainty)
                     refused += [_SET_ANEW[k] for k, x in wider.items() if x > ANEW.get(k, np.inf)]
                     made = self._widened(made, z, kinds, white, wider)
@@ -268,6 +254,26 @@ class WhiteningFilter:
                 off = made.E[:n, 0] - made.E[:n, 1:] @ theta
             kinds = kinds.replace(letter, "")
         return nothing(len(self.bank), self.m, epoch.t, refused, off, unlikely)
+
+    def _refusal(
+        self, epoch: Epoch, kinds: str, made: Whitening, theta: Array, uncertainty: Uncertainty
+    ) -> GateRefusal | None:
+        """What the gates say of an epoch's innovations; None where there are none, or nothing."""
+        if self.gates is None:
+            return None
+        refused = self.uses.refused
+        return self.gates.judge(
+            epoch.t,
+            kinds,
+            made.E,
+            made.W[0, :, 0],
+            made.W[0, :, 1 : self._m1],
+            theta,
+            uncertainty,
+            made.whitener,
+            wider=math.sqrt(self.variances.times(epoch.stated)[0].max()),
+            velocity=None if refused is None else refused.by(epoch.stamp),
+        )
 
     def _widened(
         self, made: Whitening, z: Array, kinds: str, white: Array, wider: Mapping[str, float]
