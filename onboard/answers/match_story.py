@@ -22,7 +22,7 @@ from onboard.core.physics.finding import Where
 from onboard.core.physics.wording import places
 from onboard.core.vehicle.limits import SURE
 from onboard.core.vehicle.places import AXES
-from onboard.core.vehicle.records import Compared, Difference, NotTestable
+from onboard.core.vehicle.records import Compared, Difference, NotTestable, sigma_along
 
 Values = Mapping[str, Compared]
 SEVERITIES = {
@@ -106,18 +106,13 @@ def _against(value: Compared) -> str:
 def _wind(v: Values) -> str:
     north, east = v["north"], v["east"]
     speed = math.hypot(north.real, east.real)
-    sigma = _along(north, east)
+    sigma = sigma_along(north.real, east.real, north.sigma, east.sigma)
     said = f"The wind was {whole(speed, sigma, 'm/s')} from {_from(north.real, east.real)}"
     still = math.hypot(north.simulation, east.simulation)
     if still < 0.05:
         return f"{said}; the simulation's air stands still."
     theirs = f"{still:.1f} m/s from {_from(north.simulation, east.simulation)}"
     return f"{said}; the simulation's was {theirs}."
-
-
-def _along(north: Compared, east: Compared) -> float:
-    speed = max(math.hypot(north.real, east.real), 1e-9)
-    return math.hypot(north.real * north.sigma, east.real * east.sigma) / speed
 
 
 def _from(north: float, east: float) -> str:

@@ -149,7 +149,7 @@ def of_wind(wind: WindEstimate) -> list[Markup]:
                 summary=f"mean {words.number(float(np.mean(series[:, k])))} m/s",
             )
         )
-    speed = math.hypot(wind.north, wind.east)
+    speed = wind.speed
     if speed < LEAST_WIND_M_S:
         return out
     along = np.array([wind.north, wind.east]) / speed

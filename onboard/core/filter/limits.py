@@ -99,8 +99,8 @@ STAMP_JITTER_S: Final = 8e-4
 (0.29) and the autopilot's loop of 2.5 ms (0.72), uniform both [physics]."""
 
 STATED_M_S: Final = 0.3
-"""m/s; the accuracy of a velocity that noise levels are of, by the receiver's own word: what
-ArduPilot's simulator says, and receivers with a good sky [data sheet]."""
+"""m/s; accuracy of a velocity by the receiver's own word, over which what is stated is kept, and
+which a fix has that states nothing: what receivers say with a good sky [data sheet]."""
 
 # The search for noise levels (noise).
 

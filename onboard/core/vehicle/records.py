@@ -86,16 +86,16 @@ class WindEstimate:
     @property
     def sigma_along(self) -> float:
         """Of the speed, m/s; of a calm that of either component at its largest."""
-        return _sigma(self.north, self.east, self.sigma_north, self.sigma_east)
+        return sigma_along(self.north, self.east, self.sigma_north, self.sigma_east)
 
     @property
     def sigma_across(self) -> float:
         """Of what turns it, m/s."""
-        return _sigma(-self.east, self.north, self.sigma_north, self.sigma_east)
+        return sigma_along(-self.east, self.north, self.sigma_north, self.sigma_east)
 
 
-def _sigma(north: float, east: float, sigma_north: float, sigma_east: float) -> float:
-    """Along a direction, of two components that err each by itself."""
+def sigma_along(north: float, east: float, sigma_north: float, sigma_east: float) -> float:
+    """Along (north, east), of two components that err each by itself; of nothing the larger."""
     length = math.hypot(north, east)
     if length == 0.0:
         return max(sigma_north, sigma_east)
