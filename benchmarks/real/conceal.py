@@ -26,7 +26,7 @@ from benchmarks.real.concealed import KINDS
 from benchmarks.real.concealed_kind import Array, Kind, about
 from benchmarks.real.concealed_response import weighed
 from benchmarks.real.flights import judged, told
-from benchmarks.real.outcomes import LEGEND, Outcome, Said, compared, table
+from benchmarks.real.outcomes import LEGEND, SIGMAS, Outcome, Said, compared, table
 from benchmarks.real.split import RealFlight
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.estimate.result import SIX_NAMES
@@ -91,11 +91,13 @@ def headings(untouched: Judge) -> Array:
 def asked(untouched: Judge, other: Judge, effect: str) -> dict[str, tuple[float, float]]:
     """What the untouched flight says of an effect that was found in the other one only.
 
-    A flight wanders by itself at that moment, along that axis, by less than it would say.
+    A flight wanders by itself at that moment, along that axis, by less than it would say.  A jump
+    that it has by itself at another moment is another one, beside which this one is asked about.
     """
-    mine = untouched.evidence.families
-    more = [_of(untouched, f) for f in other.evidence.families if f.effect == effect]
-    if not more or any(f.effect == effect for f in mine):
+    mine = [f for f in untouched.evidence.families if f.effect == effect]
+    theirs = [f for f in other.evidence.families if f.effect == effect]
+    more = [_of(untouched, f) for f in theirs if not any(_alike(f, own) for own in mine)]
+    if not more:
         return {}
     engine = untouched.engine.beside(more).with_rows()
     solution = engine.found()
@@ -105,6 +107,14 @@ def asked(untouched: Judge, other: Judge, effect: str) -> dict[str, tuple[float,
         for f in more
         for key, i in zip(f.keys, engine.indices(f), strict=False)
     }
+
+
+def _alike(one: Effect, other: Effect) -> bool:
+    """Whether two effects of one name are the same: a jump, within three sigma of its moment."""
+    if not (isinstance(one, BiasStep) and isinstance(other, BiasStep)):
+        return True
+    apart = abs(one.moment - other.moment)
+    return apart <= SIGMAS * float(np.hypot(one.onset_sigma, other.onset_sigma))
 
 
 def _of(untouched: Judge, effect: Effect) -> Effect:

@@ -64,7 +64,7 @@ def side_places(model: ForceModel) -> list[int]:
 def upwards(model: ForceModel, theta: Array) -> Rows:
     """Whitened force upwards, to which the slope of the lift is what it is at the mean angle."""
     k = model.axes.index(UP)
-    columns = model.jacobian(theta)[:, k]
+    columns = model.jacobian(theta).axis(k).whole
     constant, slope = model.indices(Lift.name)
     columns[:, slope] = float(np.mean(model.air(theta).alpha)) * columns[:, constant]
     windows = windows_of(model.flight)
@@ -76,7 +76,7 @@ def sideways(model: ForceModel, theta: Array) -> Rows:
     """Whitened force to the side, with the sideslip as far as the rudder tells it."""
     windows, k = windows_of(model.flight), model.axes.index(SIDE)
     left = windows.mean((model.measured() - model.predicted(theta))[:, k])
-    rows = whitened_axis(left, windows.mean(model.jacobian(theta)[:, k]), windows)
+    rows = whitened_axis(left, model.jacobian(theta).axis(k).means(windows).whole, windows)
     slope, rudder = side_places(model)
     columns = rows.regressors.copy()
     columns[:, [slope]] = told_by(columns[:, [slope]], columns[:, [rudder]])

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
+from onboard.core.vehicle.bordered import Bordered
 from onboard.core.vehicle.fit import BlockSums, Fit
 from onboard.core.vehicle.limits import APART, FOLDS, SURE
 
@@ -109,38 +111,54 @@ class Choices:
         """
         f, blocks = self.fit, self.fit.blocks
         lasts = set(places)
-        free = self._free(effects)
-        by_all = self._spread(self._N, free)
+        free = np.array(self._free(effects))
+        fixed = self._fixed(free)
+        rest = (self._b - self._N @ fixed + f.prior * (self._nominal - fixed))[free]
+        information = (self._N + np.diag(f.prior))[np.ix_(free, free)]
+        by_all = dict(zip(free.tolist(), np.diag(np.linalg.inv(information)), strict=True))
+        bound = (f.model.least - f.theta)[free]
+        system = Bordered.of(information, rest, self._own(free, bound, places))
         for i in range(len(blocks) - 1):
-            N, b, _ = _sum(blocks[i : i + 2])
-            x, _ = self._at(effects, self._N - N, self._b - b)
-            sigmas = self._spread(self._N - N, free)
+            # What other flights have to themselves does not change with these blocks.
+            at, N, b = system.keeping({blocks[i].part, blocks[i + 1].part})
+            its = free[at]
+            for block in blocks[i : i + 2]:
+                N -= block.N[np.ix_(its, its)]
+                b -= (block.b - block.N @ fixed)[its]
+            x = dict(zip(its.tolist(), least_above(N, b, bound[at]).tolist(), strict=True))
+            variance = dict(zip(its.tolist(), np.diag(np.linalg.inv(N)), strict=True))
             for k in tuple(lasts):
-                unknown = f.model.unknowns[k]
+                unknown, root = f.model.unknowns[k], math.sqrt(f.inflation[k])
                 apart = abs(f.theta[k] + x[k] - unknown.nominal)
                 moved = abs(whole.x[k] - x[k])
-                chance = math.sqrt(max(sigmas[k] ** 2 - by_all[k] ** 2, 0.0))
-                if moved > APART * chance and apart < unknown.floor + SURE * sigmas[k]:
+                chance = root * math.sqrt(max(variance[k] - by_all[k], 0.0))
+                sigma = root * math.sqrt(variance[k])
+                if moved > APART * chance and apart < unknown.floor + SURE * sigma:
                     lasts.discard(k)
         return bool(lasts)
+
+    def _own(self, free: NDArray[np.intp], bound: Array, asked: Sequence[int]) -> list[list[int]]:
+        """Places among the free of what each flight has to itself and nothing asks or bounds."""
+        its = self.fit.jacobian.places
+        alone = np.any(its != its[0], axis=0)
+        able = np.isneginf(bound) & ~np.isin(free, asked)
+        return [np.flatnonzero(able & np.isin(free, row[alone])).tolist() for row in its]
+
+    def _fixed(self, free: NDArray[np.intp]) -> Array:
+        """(m,) unknowns about the fit's of what is not free; zero of what is."""
+        x = self._nominal.copy()
+        x[free] = 0.0
+        return x
 
     def _free(self, effects: Sequence[str]) -> list[int]:
         """Places of what is free with these effects."""
         return sorted({i for n in (*effects, "") for i in self.fit.model.indices(n)})
 
-    def _spread(self, N: Array, free: list[int]) -> dict[int, float]:
-        """Inflated sigmas of the free unknowns by sums (m, m), by place."""
-        f = self.fit
-        information = (N + np.diag(f.prior))[np.ix_(free, free)]
-        plain = np.sqrt(np.diag(np.linalg.inv(information)) * f.inflation[free])
-        return dict(zip(free, plain.tolist(), strict=True))
-
     def _at(self, effects: Sequence[str], N: Array, b: Array) -> tuple[Array, list[int]]:
         """Unknowns about the fit's by these sums, and which of them are free."""
         f = self.fit
         free = self._free(effects)
-        x = self._nominal.copy()
-        x[free] = 0.0
+        x = self._fixed(np.array(free))
         full_N, full_b = N + np.diag(f.prior), b + f.prior * self._nominal
         rest = full_b - full_N @ x
         bound = (f.model.least - f.theta)[free]

@@ -137,7 +137,7 @@ def _balanced(model: ForceModel, theta: Array) -> Array:
     for _ in range(3):
         up = model.axes.index(UP)
         short = float(np.mean((model.measured() - model.predicted(out))[:, up]))
-        slope = float(np.mean(model.jacobian(out)[:, up, places[0]]))
+        slope = float(np.mean(model.jacobian(out).of(places[:1])[:, up]))
         out[places[0]] += short / slope
     return out
 
@@ -164,7 +164,7 @@ def _rows(model: ForceModel, theta: Array) -> Rows:
         return out
 
     windows = windows_of(model.flight)
-    left, columns = windows.mean(apart(residual)), windows.mean(apart(steady.jacobian(theta)))
+    left, columns = windows.mean(apart(residual)), windows.mean(apart(steady.jacobian(theta).whole))
     return whitened_axis(left, columns, windows)
 
 

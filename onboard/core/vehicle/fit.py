@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.half_space import least_above
-from onboard.core.vehicle.instruments import (
-    whitened_regressors,
-    whitened_residual,
-    whitened_rows,
-)
+from onboard.core.vehicle.columns import Columns
+from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
     BLOCK_S,
     FEWEST_BLOCKS,
@@ -62,7 +59,7 @@ class Fit:
         inflation: (m,) by how much variances exceed what whitened rows promise.
         noise: by axis.
         residual: (n, k) measured less predicted, m/s^2.
-        jacobian: (n, k, m) of the prediction.
+        jacobian: (n, k) of the prediction.
         sensitivity: (n, k) to gusts, 1/s.
         block: (n,) number of the block of each step.
         doubt: (m,) by how much laws may be wrong in the unknowns.
@@ -76,7 +73,7 @@ class Fit:
     inflation: Array
     noise: tuple[AxisNoise, ...]
     residual: Array
-    jacobian: Array
+    jacobian: Columns
     sensitivity: Array
     block: Array
     doubt: Array
@@ -124,10 +121,10 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Slopes:
-    """Derivatives (n, k, m) of a prediction, and without a tilt; None where that is not needed."""
+    """Derivatives (n, k) of a prediction, and without a tilt; None where that is not needed."""
 
-    by: Array
-    level: Array | None
+    by: Columns
+    level: Columns | None
 
 
 def slopes_at(model: ForceModel, theta: Array) -> Slopes:
@@ -191,14 +188,18 @@ def summed(
     of_row = np.floor((model.flight.t[windows.first] - model.flight.t[0]) / BLOCK_S)
     # A step is of the block that its row is counted in, wherever the next one begins.
     block = np.repeat(of_row, windows.counts)
-    rows = whitened_rows(model, residual, jacobian, noise, sensitivity, level)
+    left = whitened_residual(model, residual, noise, sensitivity)
+    by = whitened_regressors(model, jacobian, noise, sensitivity, level)
     part = model.flight.part[windows.first]
     sums = []
     for number in np.unique(of_row):
         mine = of_row == number
-        y = np.concatenate([r[mine, 0] for r in rows])
-        h = np.concatenate([r[mine, 1:] for r in rows])
-        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), int(part[mine][0])))
+        y = np.concatenate([axis[mine] for axis in left])
+        h = [columns.at(mine) for columns in by]
+        whole = replace(
+            h[0], by=np.concatenate([c.by for c in h]), part=np.concatenate([c.part for c in h])
+        )
+        sums.append(BlockSums(*whole.normal(y), float(y @ y), len(y), int(part[mine][0])))
     return Fit(
         model,
         theta,
@@ -227,7 +228,7 @@ def _settled(
         apart = at - nominal
         return float(sum(y @ y for y in left(at)) + prior @ (apart * apart))
 
-    def regressors(at: Array) -> list[Array]:
+    def regressors(at: Array) -> list[Columns]:
         level = _level(model, at)
         return whitened_regressors(model, model.steps(at), noise, sensitivity, level)
 
@@ -238,9 +239,9 @@ def _settled(
         if np.max(np.abs(theta - at) / model.plausible) > STALE:
             at, by = theta, regressors(theta)
         N, b = np.diag(prior), prior * (nominal - theta)
-        for h, y in zip(by, left(theta), strict=True):
-            N = N + h.T @ h
-            b = b + h.T @ y
+        for columns, y in zip(by, left(theta), strict=True):
+            more_N, more_b = columns.normal(y)
+            N, b = N + more_N, b + more_b
         step = least_above(N, b, model.least - theta)
         sigma = np.sqrt(np.diag(np.linalg.inv(N)))
         size = float(np.max(np.abs(step) / sigma))
@@ -266,8 +267,8 @@ def _settled(
     return theta
 
 
-def _level(model: ForceModel, theta: Array) -> Array | None:
-    """(n, k, m) derivatives without a tilt; None where they are not needed."""
+def _level(model: ForceModel, theta: Array) -> Columns | None:
+    """(n, k) derivatives without a tilt; None where they are not needed."""
     return model.levelled.steps(theta) if model.instrumented else None
 
 

@@ -12,6 +12,8 @@ what is left of the force: an error of the angle that shortens the law of the fo
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from onboard.core.maths.arrays import Array
@@ -60,7 +62,9 @@ def turned_by_gusts(fit: Fit, rms: float, felt: Felt | None = None) -> Turned:
     for axis in range(3):
         gust = GUST * fit.model.flight.R_bn[:, axis]
         slope = windows.mean(fit.model.predicted(fit.theta, gust) - here) / GUST
-        turned = windows.mean(fit.model.jacobian(fit.theta, gust) - fit.jacobian) / GUST
+        with_gust = fit.model.jacobian(fit.theta, gust)
+        apart = replace(with_gust, by=with_gust.by - fit.jacobian.by)
+        turned = apart.means(windows).whole / GUST
         level = _level(fit, sizes, slope, axis, rms)
         for k, size in enumerate(sizes):
             if felt is not None and felt.ahead and k == AHEAD:

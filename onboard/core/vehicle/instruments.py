@@ -13,11 +13,13 @@ Harmless Econometrics* (2009), chapter 4.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
+from onboard.core.vehicle.columns import Columns
 from onboard.core.vehicle.limits import INSTRUMENT_WINDOWS, PATH_WINDOWS, THRUST_AXIS
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, whitened
@@ -30,24 +32,22 @@ LEAST_TOLD = 1e-8
 def whitened_rows(
     model: ForceModel,
     residual: Array,
-    jacobian: Array,
+    jacobian: Columns,
     noise: Sequence[AxisNoise],
     sensitivity: Array,
-    level: Array | None = None,
 ) -> list[Array]:
     """For each axis (r, 1 + m): whitened residual and regressors, of means over windows.
 
     Args:
         model: of k axes and m unknowns.
         residual: (n, k) measured less predicted, m/s^2.
-        jacobian: (n, k, m) of the prediction.
+        jacobian: (n, k) of the prediction.
         noise: by axis.
         sensitivity: (n, k) to gusts, 1/s.
-        level: (n, k, m) of the prediction without a tilt; where axes are instrumented.
     """
     left = whitened_residual(model, residual, noise, sensitivity)
-    by = whitened_regressors(model, jacobian, noise, sensitivity, level)
-    return [np.column_stack([y, h]) for y, h in zip(left, by, strict=True)]
+    by = whitened_regressors(model, jacobian, noise, sensitivity)
+    return [np.column_stack([y, h.whole]) for y, h in zip(left, by, strict=True)]
 
 
 def whitened_residual(
@@ -64,29 +64,42 @@ def whitened_residual(
 
 def whitened_regressors(
     model: ForceModel,
-    jacobian: Array,
+    jacobian: Columns,
     noise: Sequence[AxisNoise],
     sensitivity: Array,
-    level: Array | None = None,
-) -> list[Array]:
-    """For each axis (r, m): whitened regressors, told from the past where it is instrumented.
+    level: Columns | None = None,
+) -> list[Columns]:
+    """For each axis (r,): whitened regressors, told from the past where it is instrumented.
 
-    Arguments are those of :func:`whitened_rows`.
+    Of several flights each is told from its own: what a vehicle did before a gust is a matter of
+    who flew it, and how.
+
+    Args:
+        model: of k axes and m unknowns.
+        jacobian: (n, k) of the prediction.
+        noise: by axis.
+        sensitivity: (n, k) to gusts, 1/s.
+        level: (n, k) of the prediction without a tilt; where axes are instrumented.
     """
     windows = windows_of(model.flight)
-    m, out = jacobian.shape[-1], []
+    part = model.flight.part[windows.first]
+    d, out = jacobian.by.shape[-1], []
     for k, its in enumerate(noise):
         instrumented = model.axes[k] in model.instrumented
         sideways = instrumented and model.axes[k] != THRUST_AXIS and level is not None
-        columns = jacobian[:, k]
+        columns = jacobian.by[:, k]
         if sideways and level is not None:
-            columns = np.hstack([columns, level[:, k]])
+            columns = np.hstack([columns, level.by[:, k]])
         made = _whitened(windows, columns, its, sensitivity[:, k])
         if instrumented:
-            mine, other = made[:, :m], made[:, m:]
+            mine, other = made[:, :d], made[:, d:]
             before = (other, PATH_WINDOWS) if sideways else (mine, INSTRUMENT_WINDOWS)
-            made = told_by(mine, _past(before[0], windows.piece, before[1]))
-        out.append(made)
+            past = _past(before[0], windows.piece, before[1])
+            made = np.empty_like(mine)
+            for number in np.unique(part).tolist():
+                its_own = part == number
+                made[its_own] = told_by(mine[its_own], past[its_own])
+        out.append(replace(jacobian, by=made, part=part))
     return out
 
 

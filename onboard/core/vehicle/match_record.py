@@ -105,9 +105,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
                 "vehicle",
                 {s.name: Compared(s.nominal, s.value, s.sigma, s.unit) for s in shown},
                 max(chosen.gains[name], 0.0) / whole if whole > 0.0 else 0.0,
-                places_of(
-                    m.model.flight, fit.jacobian[:, :, places] @ apart, m.model.axes, fit.block
-                ),
+                places_of(m.model.flight, fit.jacobian.of(places) @ apart, m.model.axes, fit.block),
                 chosen.rivals[name],
                 rms(left_by(m.choices, without)[:, columns]),
                 rms(m.held[:, columns]),

@@ -194,15 +194,15 @@ def held_out(choices: Choices, effects: tuple[str, ...]) -> Array:
     numbers = np.unique(fit.block)
     for fold, x in choices.by_fold(effects):
         mine = np.isin(fit.block, numbers[fold])
-        out[mine] -= fit.jacobian[mine] @ x
+        out[mine] -= fit.jacobian.at(mine).times(x)
     return out
 
 
 def left_by(choices: Choices, effects: tuple[str, ...]) -> Array:
     """(n, k) the same, with what no effect describes in it: it is not handed back."""
     fit = choices.fit
-    mine = [k for k in range(len(fit.theta)) if isinstance(fit.model.effect_of(k), Beyond)]
-    out: Array = held_out(choices, effects) + fit.jacobian[:, :, mine] @ fit.theta[mine]
+    mine = [isinstance(fit.model.effect_of(k), Beyond) for k in range(len(fit.theta))]
+    out: Array = held_out(choices, effects) + fit.jacobian.times(np.where(mine, fit.theta, 0.0))
     return out
 
 

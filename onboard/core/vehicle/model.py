@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.columns import Columns
 from onboard.core.vehicle.effects.effect import Effect, Unknown
 from onboard.core.vehicle.effects.own import Own
 from onboard.core.vehicle.flight import Flight
@@ -39,9 +41,9 @@ class _Listed:
         places: of an effect's unknowns, by its name.
         owners: which effect each unknown is of.
         acting: each effect with where its unknowns begin and end.
-        directions: places of unknowns that are asked about at once: no step has more than one of
-            them.  They are those of an effect that has numbers of its own in each of several
-            flights.
+        directions: (p, d) places of unknowns that are asked about at once, by flight: no step has
+            more than one of them.  They are those of an effect that has numbers of its own in each
+            of several flights; of others the same place is there for each flight.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -51,14 +53,14 @@ class _Listed:
     places: dict[str, list[int]]
     owners: list[int]
     acting: list[tuple[Effect, int, int]]
-    directions: list[list[int]]
+    directions: NDArray[np.intp]
 
     @classmethod
     def of(cls, effects: Sequence[Effect], *, bounded: bool) -> _Listed:
         """Those of some effects; with ``bounded=False`` they may be as little as they like."""
         unknowns = tuple(u for e in effects for u in e.unknowns)
         places: dict[str, list[int]] = {}
-        acting, directions, at = [], [], 0
+        acting, directions, at = [], list[list[int]](), 0
         for effect in effects:
             n = len(effect.unknowns)
             acting.append((effect, at, at + n))
@@ -66,6 +68,7 @@ class _Listed:
             stride = effect.count if isinstance(effect, Own) else n
             directions += [list(range(at + j, at + n, stride)) for j in range(stride)]
             at += n
+        flights = max(map(len, directions), default=1)
         return cls(
             unknowns,
             np.array([u.nominal for u in unknowns]),
@@ -74,7 +77,7 @@ class _Listed:
             places,
             [k for k, e in enumerate(effects) for _ in e.unknowns],
             acting,
-            directions,
+            np.array([d if len(d) > 1 else d * flights for d in directions], dtype=np.intp).T,
         )
 
 
@@ -243,23 +246,27 @@ class ForceModel:
         out: Array = every[:, list(self.axes)]
         return out
 
-    def _spread(self, places: list[int], apart: Array, out: Array) -> None:
-        """Put the differences (n, k) of some places, by their sizes, into (n, k, m) columns."""
-        for number, (j, size) in enumerate(
-            zip(places, self._listed.plausible[places], strict=True)
-        ):
-            mine = self.flight.part == number if len(places) > 1 else slice(None)
-            out[mine, :, j] = apart[mine] / (DIFFERENCE * size)
+    def _slopes(self, apart: Callable[[Array, int], Array]) -> Columns:
+        """Derivatives by all unknowns.
 
-    def steps(self, theta: Array) -> Array:
-        """(n, k, m) derivatives by one-sided differences: good enough to step by."""
+        Args:
+            apart: differences (n, k) of the prediction by a change of the unknowns (m,), of which
+                an effect's are the first (its number).
+        """
+        listed, part = self._listed, self.flight.part
+        sizes = DIFFERENCE * listed.plausible
+        by = np.empty((len(self.flight), len(self.axes), len(listed.directions.T)))
+        for j, places in enumerate(listed.directions.T):
+            change = np.zeros(len(sizes))
+            change[places] = sizes[places]
+            made = apart(change, listed.owners[places[0]])
+            np.divide(made, sizes[places][part, None], out=by[:, :, j])
+        return Columns(by, listed.directions, part, len(sizes))
+
+    def steps(self, theta: Array) -> Columns:
+        """(n, k) derivatives by one-sided differences: good enough to step by."""
         here, stages = self.predicted(theta), self._stages(theta)
-        out, owners = np.zeros((*here.shape, len(theta))), self._listed.owners
-        for places in self._listed.directions:
-            there = theta.copy()
-            there[places] += DIFFERENCE * self._listed.plausible[places]
-            self._spread(places, self._from(stages, owners[places[0]], there) - here, out)
-        return out
+        return self._slopes(lambda change, owner: self._from(stages, owner, theta + change) - here)
 
     def columns(self, theta: Array, places: Sequence[int]) -> Array:
         """(n, k, p) derivatives by some of the unknowns, by central differences."""
@@ -271,16 +278,13 @@ class ForceModel:
             out.append(0.5 * apart / step[j])
         return np.stack(out, axis=-1)
 
-    def jacobian(self, theta: Array, gust: Array | None = None) -> Array:
-        """(n, k, m) derivatives by central differences, in air that also moves by ``gust``."""
-        stages, owners = self._stages(theta, gust), self._listed.owners
-        out = np.zeros((len(self.flight), len(self.axes), len(theta)))
-        for places in self._listed.directions:
-            h = DIFFERENCE * self._listed.plausible[places]
-            up, down = theta.copy(), theta.copy()
-            up[places] += h
-            down[places] -= h
-            owner = owners[places[0]]
-            apart = self._from(stages, owner, up) - self._from(stages, owner, down)
-            self._spread(places, 0.5 * apart, out)
-        return out
+    def jacobian(self, theta: Array, gust: Array | None = None) -> Columns:
+        """(n, k) derivatives by central differences, in air that also moves by ``gust``."""
+        stages = self._stages(theta, gust)
+
+        def apart(change: Array, owner: int) -> Array:
+            up = self._from(stages, owner, theta + change)
+            out: Array = 0.5 * (up - self._from(stages, owner, theta - change))
+            return out
+
+        return self._slopes(apart)

@@ -103,7 +103,7 @@ def _found(
     axes = [k for k, axis in enumerate(wide.model.axes) if axis in sides]
     if not axes:
         return None
-    made = wide.jacobian[:, axes][:, :, places]
+    made = wide.jacobian.of(places)[:, axes]
     force, sigma = rms(made @ x), _spread(made, whole.covariance[np.ix_(places, places)])
     # Up to here it may be the velocity's or the heading's error, as gusts that small may be.
     # By its past a law shows that it is there; how large it is, it shows by itself.
@@ -142,11 +142,10 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     model = replace(fit.model, effects=tuple(effects))
     theta = np.insert(fit.theta, place, np.zeros(len(effect.unknowns)))
     more = list(range(place, place + len(effect.unknowns)))
-    by = np.insert(slopes.by, [place] * len(more), model.columns(theta, more), axis=2)
+    by = slopes.by.inserted(place, model.columns(theta, more))
     level = slopes.level
     if level is not None:
-        columns = model.levelled.columns(theta, more)
-        level = np.insert(level, [place] * len(more), columns, axis=2)
+        level = level.inserted(place, model.levelled.columns(theta, more))
     wide = summed(
         model, theta, 1.0 / model.plausible**2, fit.noise, fit.sensitivity, Slopes(by, level)
     )

@@ -21,7 +21,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustChange
 from onboard.core.vehicle.fit import Fit, fitted
-from onboard.core.vehicle.instruments import whitened_residual, whitened_rows
+from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
     AMBIGUOUS,
     BLOCK_S,
@@ -90,21 +90,28 @@ def _white(fit: Fit) -> tuple[AxisNoise, ...]:
 def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
     """(c,) fall of chi-square by a change at each of these windows, to first order."""
     slope, prior = _always(fit, changing)
-    made = whitened_rows(fit.model, fit.residual, fit.jacobian, fit.noise, fit.sensitivity)
-    m, p = fit.jacobian.shape[-1], slope.shape[-1]
-    by_rows, squares = np.zeros((len(moments), p, 1 + m)), np.zeros((len(moments), p, p))
-    for k, rows in enumerate(made):
-        its, with_itself = _products(fit, k, slope[:, k], rows)
+    left = whitened_residual(fit.model, fit.residual, fit.noise, fit.sensitivity)
+    by = whitened_regressors(fit.model, fit.jacobian, fit.noise, fit.sensitivity)
+    p, d = slope.shape[-1], fit.jacobian.by.shape[-1]
+    by_rows, squares = np.zeros((len(moments), p, 1 + d)), np.zeros((len(moments), p, p))
+    # At the fit what the flight asks of the others is what their prior holds back.
+    N, asked = np.diag(fit.prior), fit.prior * (fit.model.nominal - fit.theta)
+    for k, (y, columns) in enumerate(zip(left, by, strict=True)):
+        its, with_itself = _products(fit, k, slope[:, k], np.column_stack([y, columns.by]))
         by_rows += its[moments]
         squares += with_itself[moments]
-    whole = sum((rows.T @ rows for rows in made), np.zeros((1 + m, 1 + m)))
-    # What the other unknowns would take of it.
-    told = np.linalg.solve(whole[1:, 1:] + np.diag(fit.prior), np.swapaxes(by_rows[..., 1:], 1, 2))
-    # At the fit what the flight asks of them is what their prior holds back.
-    asked = whole[1:, 0] + fit.prior * (fit.model.nominal - fit.theta)
-    u = by_rows[..., 0] - np.einsum("cmp,m->cp", told, asked)
-    S = squares - by_rows[..., 1:] @ told + prior
-    out: Array = np.einsum("cp,cp->c", u, np.linalg.solve(S, u[..., None])[..., 0])
+        more_N, more_b = columns.normal(y)
+        N, asked = N + more_N, asked + more_b
+    covariance, out = np.linalg.inv(N), np.zeros(len(moments))
+    part = fit.model.flight.part[windows_of(fit.model.flight).first][moments]
+    for number in np.unique(part).tolist():
+        # A change is one of its own flight, and has rows in common with what acts there.
+        here, places = part == number, fit.jacobian.places[number]
+        its = by_rows[here, :, 1:]
+        # What the other unknowns would take of it.
+        u = by_rows[here, :, 0] - its @ (covariance[places] @ asked)
+        S = squares[here] - its @ covariance[np.ix_(places, places)] @ np.swapaxes(its, 1, 2)
+        out[here] = np.einsum("cp,cp->c", u, np.linalg.solve(S + prior, u[..., None])[..., 0])
     return out
 
 
@@ -154,7 +161,7 @@ def _always(fit: Fit, changing: Changing) -> tuple[Array, Array]:
     places = [i for n in CHANGES for i in models[0].indices(n)]
     # Each is of its own recording, and nothing elsewhere.
     slope = sum(
-        (m.jacobian(_padded(fit, m))[:, :, places] for m in models),
+        (m.columns(_padded(fit, m), places) for m in models),
         np.zeros((len(flight), len(fit.model.axes), len(places))),
     )
     return windows_of(flight).mean(slope), np.diag(1.0 / models[0].plausible[places] ** 2)

@@ -37,9 +37,17 @@ def _of_thrust(air: Air, share: Array) -> Array:
 def _apart(air: Air, x: Array, *others: Array) -> Array:
     """(n,) what of it others (n,), and a constant of each flight, do not make."""
     part = air.flight.part
-    each = (part[:, None] == np.arange(air.flight.parts)).astype(float)
-    made = np.column_stack([each, *others])
-    out: Array = x - made @ np.linalg.lstsq(made, x, rcond=None)[0]
+    count = np.bincount(part)
+
+    def about_its_mean(y: Array) -> Array:
+        out: Array = y - (np.bincount(part, y) / count)[part]
+        return out
+
+    left = about_its_mean(x)
+    if not others:
+        return left
+    made = np.column_stack([about_its_mean(y) for y in others])
+    out: Array = left - made @ np.linalg.lstsq(made, left, rcond=None)[0]
     return out
 
 
