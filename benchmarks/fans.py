@@ -181,6 +181,32 @@ def by_parabola(concealed: Sequence[Flight], known: Sequence[Flight]) -> list[fl
     return out
 
 
+HEAD: Final = f"{'flight':28}{'fans':>7}{'found':>8}{'sigma':>8}{'off':>8}{'parabola off':>14}  m/s"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The wind of one flight, m/s: found, its sigma, and by a parabola of the mean force."""
+
+    flight: Flight
+    wind: float
+    sigma: float
+    plain: float
+
+    @property
+    def off(self) -> float:
+        """By how much it is more than the fans' name."""
+        return self.wind - self.flight.wind
+
+    def __str__(self) -> str:
+        """As a row under :data:`HEAD`."""
+        name = f"{self.flight.controller}, {self.flight.fans}"
+        return (
+            f"{name:28}{self.flight.wind:7.1f}{self.wind:8.2f}{self.sigma:8.2f}"
+            f"{self.off:+8.2f}{self.plain - self.flight.wind:+14.2f}"
+        )
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -192,22 +218,29 @@ def main(arguments: list[str] | None = None) -> None:
         default=list(CONTROLLERS[1:4]),
         help="controllers whose flights' winds are",
     )
+    parser.add_argument(
+        "--each",
+        action="store_true",
+        help="each controller's in turn, all others' told (an hour and more)",
+    )
     chosen = parser.parse_args(arguments)
     every = [read(path) for path in sorted(chosen.folder.glob("*.csv"))]
-    concealed = [f for f in every if f.controller in chosen.concealed]
-    known = [f for f in every if f.controller not in chosen.concealed]
-    if not concealed or not known:
-        parser.error(f"no flights of these controllers, or of no others, in {chosen.folder}")
-    found, plain = matched(concealed, known), by_parabola(concealed, known)
-    print(f"{'flight':28}{'fans':>7}{'found':>8}{'sigma':>8}{'off':>8}{'parabola off':>14}  m/s")
-    for f, (wind, sigma), other in zip(concealed, found, plain, strict=True):
-        print(
-            f"{f.controller + ', ' + f.fans:28}{f.wind:7.1f}{wind:8.2f}{sigma:8.2f}"
-            f"{wind - f.wind:+8.2f}{other - f.wind:+14.2f}"
-        )
-    off = np.array([wind - f.wind for f, (wind, _) in zip(concealed, found, strict=True)])
-    sigmas = np.array([sigma for _, sigma in found])
-    others = np.array([p - f.wind for f, p in zip(concealed, plain, strict=True)])
+    found: list[Found] = []
+    for names in [[c] for c in CONTROLLERS] if chosen.each else [chosen.concealed]:
+        concealed = [f for f in every if f.controller in names]
+        known = [f for f in every if f.controller not in names]
+        if not concealed or not known:
+            parser.error(f"no flights of these controllers, or of no others, in {chosen.folder}")
+        rows = zip(concealed, matched(concealed, known), by_parabola(concealed, known), strict=True)
+        some = [Found(flight, *wind, plain) for flight, wind, plain in rows]
+        if not found:
+            print(HEAD)
+        for row in some:
+            print(row, flush=True)
+        found += some
+    off = np.array([f.off for f in found])
+    sigmas = np.array([f.sigma for f in found])
+    others = np.array([f.plain - f.flight.wind for f in found])
     print(
         f"RMS {_rms(off):.2f} m/s, {_rms(off / sigmas):.1f} sigma; "
         f"by a parabola of the mean force {_rms(others):.2f} m/s"

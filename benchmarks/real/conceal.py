@@ -96,7 +96,7 @@ def asked(untouched: Judge, other: Judge, effect: str) -> dict[str, tuple[float,
     """
     mine = [f for f in untouched.evidence.families if f.effect == effect]
     theirs = [f for f in other.evidence.families if f.effect == effect]
-    more = [_of(untouched, f) for f in theirs if not any(_alike(f, own) for own in mine)]
+    more = [_of(untouched, f) for f in theirs if not any(alike(f, own) for own in mine)]
     if not more:
         return {}
     engine = untouched.engine.beside(more).with_rows()
@@ -109,7 +109,7 @@ def asked(untouched: Judge, other: Judge, effect: str) -> dict[str, tuple[float,
     }
 
 
-def _alike(one: Effect, other: Effect) -> bool:
+def alike(one: Effect, other: Effect) -> bool:
     """Whether two effects of one name are the same: a jump, within three sigma of its moment."""
     if not (isinstance(one, BiasStep) and isinstance(other, BiasStep)):
         return True

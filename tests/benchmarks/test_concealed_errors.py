@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from benchmarks.real import concealed, concealed_attitude, concealed_fixes, concealed_force
+from benchmarks.real.conceal import alike
 from benchmarks.real.concealed_attitude import from_angles
 from benchmarks.real.concealed_kind import About, Kind, about
 from benchmarks.real.concealed_response import weighed
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample, ParameterValue, Sample
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 
 G = 9.80665
 LATE_S = 0.12
@@ -273,3 +276,9 @@ def test_heading_and_tilt_turn_about_down_and_about_the_body() -> None:
     ):
         R = from_angles(*angles(old.t)).T @ from_angles(new.roll, new.pitch, new.yaw)
         np.testing.assert_allclose(R, from_angles(0.05, 0.0, 0.0), atol=1e-12)
+
+
+def test_a_jump_at_another_moment_is_another_jump() -> None:
+    jump = BiasStep(Origin(0.0)).at(50.0, sigma=0.5)
+    assert alike(jump, BiasStep(Origin(0.0)).at(51.0, sigma=0.5))
+    assert not alike(jump, BiasStep(Origin(0.0)).at(66.0, sigma=0.2))

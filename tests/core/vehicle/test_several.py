@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from onboard.core.vehicle.airframe import CopterAirframe
-from onboard.core.vehicle.copter import copter_model
+from onboard.core.vehicle.copter import Variant, copter_model
 from onboard.core.vehicle.copter_match import match_copter
+from onboard.core.vehicle.instruments import whitened_regressors
 from onboard.core.vehicle.limits import BLOCK_S
 from onboard.core.vehicle.matching import described, likelier
+from onboard.core.vehicle.noise import AxisNoise
 from onboard.core.vehicle.several import joined, wind_sigmas
 from onboard.core.vehicle.signals import Signals
 from tests.core.vehicle.flights import assert_derivatives, copter_flight
@@ -48,6 +50,25 @@ def test_no_block_and_no_piece_has_steps_of_two_flights():
 def test_derivatives_of_what_is_each_flights_own_are_those_of_the_whole_prediction():
     model = copter_model(joined(flights()), CopterAirframe(), np.tile(SIGMA, (3, 1)))
     assert_derivatives(model)
+
+
+def test_what_a_gust_had_no_part_in_is_told_of_each_flight_by_itself():
+    """Whatever flew beside it: who flew it, and how, is another matter in another flight."""
+    first, second, third = flights()
+    rows, others = told([first, second]), told([first, third])
+    for axis, other in zip(rows, others, strict=True):
+        np.testing.assert_allclose(axis.at(axis.part == 0).by, other.at(other.part == 0).by)
+        assert not np.allclose(axis.at(axis.part == 1).by, other.at(other.part == 1).by)
+
+
+def told(every):
+    """Regressors of several flights, as far as they are told from before a gust."""
+    sigmas = np.tile(SIGMA, (len(every), 1))
+    model = copter_model(joined(every), CopterAirframe(), sigmas, Variant(gusts=0.8))
+    assert model.instrumented
+    even, theta = np.ones((len(model.flight), len(model.axes))), model.nominal
+    noise = [AxisNoise(0.1, 0.0, 2.0, 0.3)] * len(model.axes)
+    return whitened_regressors(model, model.steps(theta), noise, even, model.levelled.steps(theta))
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ def _of_thrust(air: Air, share: Array) -> Array:
 def _apart(air: Air, x: Array, *others: Array) -> Array:
     """(n,) what of it others (n,), and a constant of each flight, do not make."""
     part = air.flight.part
-    count = np.bincount(part)
+    count = np.maximum(np.bincount(part), 1)
 
     def about_its_mean(y: Array) -> Array:
         out: Array = y - (np.bincount(part, y) / count)[part]
