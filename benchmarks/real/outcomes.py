@@ -167,7 +167,7 @@ def _lines(o: Outcome) -> list[str]:
         return [f"{label} {o.why[:40]}"]
     out = []
     for i, c in enumerate(o.changes):
-        mark = "OFF" if not c.recovered else "ok" if c.seen else "wide"
+        mark = ("ok" if c.seen else "wide") if c.recovered else "OFF" if c.seen else "hid"
         name = c.name.rsplit(".", maxsplit=1)[-1][:8]
         words = "" if i or o.found is None else " found" if o.found else " missed"
         out.append(
@@ -208,5 +208,6 @@ def _row(label: str, some: Sequence[Outcome]) -> str:
 
 LEGEND = """\
 ok: recovered.  wide: within three sigma of a claim that is too wide to see it.
-OFF: neither.  silent: the verdict is insufficient, and then nothing is named.
+hid: too little for the flight to show, as it says.  OFF: none of these.
+silent: the verdict is insufficient, and then nothing is named.
 of seen: of those that the flight claims, or does not deny, to know well enough."""

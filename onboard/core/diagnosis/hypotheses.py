@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
-from onboard.core.diagnosis.candidates import Candidate, accepted, possible
+from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
@@ -224,18 +224,18 @@ def _likelier_jumps(
     """Candidates without those jumps that are less likely than others at the same moment.
 
     They have as many unknowns each, so their misfits are compared: scores of what is so large are
-    of the scatter along each one's own columns.  The rarer kind has to be clearly likelier.
+    of the scatter along each one's own columns.  The rarer kind has to be clearly likelier, and to
+    be of a size that can be: a scale that loses most of itself takes whatever else is wrong, and
+    stands for no jump.
     """
-    rare = [c for c in offered if c.rare]
-    usual = [c for c in offered if c.jump and not c.rare]
+    fits = [(c, fitter.fit([*beside, *c.index], held_out=False)) for c in offered if c.jump]
+    rare = [(c, fit) for c, fit in fits if c.rare and believable(fitter, fit, c)]
+    usual = [(c, fit) for c, fit in fits if not c.rare]
     if not rare or not usual:
         return list(offered)
-    least_rare, least_usual = (
-        min(fitter.fit([*beside, *c.index], held_out=False).chi2 for c in some)
-        for some in (rare, usual)
-    )
+    least_rare, least_usual = (min(fit.chi2 for _, fit in some) for some in (rare, usual))
     clearly = least_usual - least_rare > CLEARLY * max(fitter.pool.variance, 1.0)
-    gone = usual if clearly else rare
+    gone = [c for c, _ in (usual if clearly else rare)]
     return [c for c in offered if c not in gone]
 
 

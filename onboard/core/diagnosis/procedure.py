@@ -167,13 +167,33 @@ def _selected(full: Examination, asked: _Asked, origin: Origin) -> tuple[Examina
         seen = placed(full, seen)
         wide, other = _beside(full, asked.testable, choice, seen)
         if any(c.jump for c in other.chosen):
-            return wide, other
+            return _likelier(full, asked, choice, (wide, other))
         if _nobodys(wide, other, seen):
             undecided, full = seen, full.carrying(halved(seen))
             choice = _chosen(full, asked.testable)
     full, choice = _by_gps(full, asked, choice)
     choice.undecided = undecided
     return full, choice
+
+
+def _likelier(
+    full: Examination, asked: _Asked, choice: Choice, seen: tuple[Examination, Choice]
+) -> tuple[Examination, Choice]:
+    """What was chosen with a jump that others have ``seen``, or with one that the velocity shows.
+
+    Others see best what they differ by all at once; a velocity may show another jump by far more.
+    """
+    wide, other = _by_gps(full, asked, choice)
+    return (wide, other) if _by_jump(other) > _by_jump(seen[1]) + CLEARLY else seen
+
+
+def _by_jump(choice: Choice) -> float:
+    """How surprising by chance what a jump explains beside all else; minus infinity of none."""
+    fitter, scores = choice.fitter, [-inf]
+    for c in (c for c in choice.chosen if c.jump):
+        rest = [i for i in choice.free if i not in c.index]
+        scores.append(c.score(fitter, fitter.fit(rest), fitter.fit(choice.free)))
+    return max(scores)
 
 
 def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examination, Choice]:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
+from onboard.core.vehicle.block_sums import total
 from onboard.core.vehicle.bordered import Bordered
-from onboard.core.vehicle.fit import BlockSums, Fit
+from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.limits import APART, FOLDS, SURE
 
 
@@ -44,9 +45,7 @@ class Choices:
     def __init__(self, fit: Fit) -> None:
         """Take the sums of a fit."""
         self.fit = fit
-        self._N = sum((b.N for b in fit.blocks), np.zeros((len(fit.theta),) * 2))
-        self._b = sum((b.b for b in fit.blocks), np.zeros(len(fit.theta)))
-        self._s = float(sum(b.s for b in fit.blocks))
+        self._N, self._b, self._s = total(fit.blocks, len(fit.theta))
         self._nominal = fit.model.nominal_near(fit.theta) - fit.theta
         self.folds = _folds(len(fit.blocks))
 
@@ -82,7 +81,7 @@ class Choices:
         """Whitened squares of every fold, each by unknowns of the others; over the inflation."""
         total = 0.0
         for fold, x in self.by_fold(effects):
-            N, b, s = _sum([self.fit.blocks[i] for i in fold])
+            N, b, s = self._total(fold)
             total += s - 2.0 * float(b @ x) + float(x @ N @ x)
         return total / self.fit.scale
 
@@ -90,7 +89,7 @@ class Choices:
         """Blocks of each fold, and (m,) unknowns about the fit's by all other blocks."""
         out = []
         for fold in self.folds:
-            N, b, _ = _sum([self.fit.blocks[i] for i in fold])
+            N, b, _ = self._total(fold)
             x, _ = self._at(effects, self._N - N, self._b - b)
             out.append((fold, x))
         return out
@@ -123,8 +122,9 @@ class Choices:
             at, N, b = system.keeping({blocks[i].part, blocks[i + 1].part})
             its = free[at]
             for block in blocks[i : i + 2]:
-                N -= block.N[np.ix_(its, its)]
-                b -= (block.b - block.N @ fixed)[its]
+                gone = replace(block, b=block.b - block.times(fixed))
+                less_N, less_b = gone.of(its)
+                N, b = N - less_N, b - less_b
             x = dict(zip(its.tolist(), least_above(N, b, bound[at]).tolist(), strict=True))
             variance = dict(zip(its.tolist(), np.diag(np.linalg.inv(N)), strict=True))
             for k in tuple(lasts):
@@ -137,12 +137,20 @@ class Choices:
                     lasts.discard(k)
         return bool(lasts)
 
-    def _own(self, free: NDArray[np.intp], bound: Array, asked: Sequence[int]) -> list[list[int]]:
+    def _total(self, fold: Sequence[int]) -> tuple[Array, Array, float]:
+        """Sums of some blocks."""
+        return total([self.fit.blocks[i] for i in fold], len(self.fit.theta))
+
+    def _own(
+        self, free: NDArray[np.intp], bound: Array, asked: Sequence[int]
+    ) -> dict[int, NDArray[np.intp]]:
         """Places among the free of what each flight has to itself and nothing asks or bounds."""
-        its = self.fit.jacobian.places
-        alone = np.any(its != its[0], axis=0)
-        able = np.isneginf(bound) & ~np.isin(free, asked)
-        return [np.flatnonzero(able & np.isin(free, row[alone])).tolist() for row in its]
+        acting = {block.part: block.places for block in self.fit.blocks}
+        flights = sum(np.isin(free, places).astype(int) for places in acting.values())
+        able = np.isneginf(bound) & ~np.isin(free, asked) & (flights == 1) & (len(acting) > 1)
+        return {
+            part: np.flatnonzero(able & np.isin(free, places)) for part, places in acting.items()
+        }
 
     def _fixed(self, free: NDArray[np.intp]) -> Array:
         """(m,) unknowns about the fit's of what is not free; zero of what is."""
@@ -170,10 +178,3 @@ def _folds(blocks: int) -> list[list[int]]:
     """Blocks dealt to folds in turn, neighbours apart."""
     count = min(FOLDS, blocks)
     return [list(range(k, blocks, count)) for k in range(count)] if count > 1 else []
-
-
-def _sum(blocks: Sequence[BlockSums]) -> tuple[Array, Array, float]:
-    N, b = np.zeros_like(blocks[0].N), np.zeros_like(blocks[0].b)
-    for block in blocks:
-        N, b = N + block.N, b + block.b
-    return N, b, float(sum(block.s for block in blocks))

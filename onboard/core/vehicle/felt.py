@@ -26,6 +26,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.across import Rows, across, side_places, whitened_axis
 from onboard.core.vehicle.air import AHEAD, SIDE, UP
+from onboard.core.vehicle.block_sums import BlockSums
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.drag import Drag
@@ -34,7 +35,7 @@ from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
-from onboard.core.vehicle.fit import BlockSums, Fit, inflation_of
+from onboard.core.vehicle.fit import Fit, inflation_of
 from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import SETTLED
 from onboard.core.vehicle.model import GUST, ForceModel
@@ -231,7 +232,8 @@ def _summed(
         here = of_row == number
         block = np.concatenate([r[here] for r in every])
         y, h = block[:, 0], block[:, 1:]
-        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), int(part[here][0])))
+        of = int(part[here][0])
+        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), np.arange(m), of))
     return replace(
         fit,
         theta=theta,

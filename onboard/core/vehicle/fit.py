@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.half_space import least_above
+from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
 from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
@@ -31,20 +32,6 @@ from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise
 from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
-
-
-@dataclass(frozen=True, slots=True)
-class BlockSums:
-    """Sums of whitened rows about the estimate: ``N = sum h h^T``, ``b = sum h y``, ``s``.
-
-    ``part`` is which of several recordings they are of.
-    """
-
-    N: Array
-    b: Array
-    s: float
-    rows: int
-    part: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +69,7 @@ class Fit:
     @property
     def information(self) -> Array:
         """(m, m) of all blocks and the prior."""
-        out: Array = sum((b.N for b in self.blocks), np.diag(self.prior))
-        return out
+        return total(self.blocks, len(self.prior))[0] + np.diag(self.prior)
 
     @property
     def covariance(self) -> Array:
@@ -195,11 +181,9 @@ def summed(
     for number in np.unique(of_row):
         mine = of_row == number
         y = np.concatenate([axis[mine] for axis in left])
-        h = [columns.at(mine) for columns in by]
-        whole = replace(
-            h[0], by=np.concatenate([c.by for c in h]), part=np.concatenate([c.part for c in h])
-        )
-        sums.append(BlockSums(*whole.normal(y), float(y @ y), len(y), int(part[mine][0])))
+        h = np.concatenate([columns.by[mine] for columns in by])
+        its = int(part[mine][0])
+        sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), jacobian.places[its], its))
     return Fit(
         model,
         theta,
@@ -283,10 +267,12 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask) -> Array
     what is ``held`` (m,) at its bound have a mean, which is no scatter.
     """
     m = len(prior)
-    inverse = np.linalg.inv(sum((b.N for b in blocks), np.diag(prior)))
+    inverse = np.linalg.inv(total(blocks, m)[0] + np.diag(prior))
     known = np.diag(inverse @ (np.linalg.inv(inverse) - np.diag(prior)) @ inverse)
     told = np.diag(inverse) * prior < 0.5
-    scores = np.array([b.b for b in blocks])
+    scores = np.zeros((len(blocks), m))
+    for score, block in zip(scores, blocks, strict=True):
+        score[block.places] = block.b
     numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
     of_flights = np.zeros((len(numbers), m))
     np.add.at(of_flights, which, scores)

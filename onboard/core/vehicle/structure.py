@@ -151,6 +151,6 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     )
     # Where it does nothing yet, scores of what it should do have a mean, which is no scatter.
     step = Choices(wide).solved([e.name for e in effects]).x
-    there = [replace(b, b=b.b - b.N @ step) for b in wide.blocks]
+    there = [replace(b, b=b.b - b.times(step)) for b in wide.blocks]
     held = theta + step <= model.least
     return replace(wide, inflation=inflation_of(there, wide.prior, held))

@@ -79,12 +79,12 @@ def wind_of(m: Matched, number: int = 0) -> WindEstimate:
         mine = fit.block == block_number
         if not its[mine].all():
             continue
-        information = block.N[np.ix_(places, places)]
+        information, score = block.of(places)
         if np.linalg.cond(information) > 1e8:
             continue
         covariance = np.linalg.inv(information) * fit.scale
         here = float(np.mean(factor[mine]))  # the unknown is the wind at the mean height
-        found = measured + fit.theta[places] + np.linalg.solve(information, block.b[places])
+        found = measured + fit.theta[places] + np.linalg.solve(information, score)
         series.append(here * found)
         spread.append(here * np.sqrt(np.diag(covariance)))
         law.append(here * (measured + fit.theta[places]))

@@ -150,6 +150,26 @@ def test_what_others_have_seen_of_a_jump_is_evidence_once(seed):
     assert choice.confounders(a) == []
 
 
+@pytest.mark.parametrize(("largest", "said"), [(5.0, "b"), (20.0, "e")])
+def test_what_cannot_be_is_no_likelier_than_what_can(largest, said):
+    """b is what jumped, e the rarer kind that explains more, if it may be of the size it needs."""
+    rng = np.random.default_rng(3)
+    problem = made(rng, "b")
+    b, e = problem.columns("b"), problem.columns("e")
+    h, more = problem.h.copy(), 0.5 * rng.normal(size=problem.y.shape)
+    h[..., e] = 0.1 * h[..., b]
+    at = np.linalg.lstsq(h.reshape(-1, h.shape[-1])[:, b], problem.y.ravel(), rcond=None)[0]
+    h[..., e[0]] += 0.1 * more / at[0]
+    wide = Problem(problem.model, h, problem.y + more)
+    seen = Witness(0.0, 1, 100.0, np.zeros(3), np.ones(3))  # of which there is one
+    offered = [
+        replace(c, jump=True, rare=c.effect == "e", plausible=(largest,) * 3, witness=seen)
+        for c in candidates(wide, "be")
+    ]
+    choice = choose(wide.fitter(), list(range(6)), offered)
+    assert [c.effect for c in choice.chosen] == [said]
+
+
 def test_no_more_than_the_limit_is_taken():
     problem = made(np.random.default_rng(1), *WIDTHS, size=1.0)
     assert best_subset(problem) == set(WIDTHS)

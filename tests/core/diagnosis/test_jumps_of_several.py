@@ -93,6 +93,22 @@ def test_of_two_nothing_is_said_wrongly_and_sigmas_hold(imu):
 
 
 @pytest.mark.slow
+def test_a_jump_that_gps_shows_far_better_is_not_lost_to_one_that_the_other_shows():
+    """The second one's jump is the larger in their difference, and at its moment half of ours."""
+    ours = concealed.BiasStep(time=AT, imu=1, z=0.3)
+    other = concealed.BiasStep(time=AT + 13.0, imu=2, x=-0.4, z=-0.2)
+    both = dataclasses.replace(SPEC, imus=SPEC.imus[:2], effects=(ours, other))
+    judge = examine(heard(both), 1)
+    (jump,) = (e for e in judge.diagnosis().effects if "step" in e.name)
+    assert jump.name == "bias_step"
+    time = jump.unknowns["time"]
+    assert time.value + judge.final.origin.t0 == pytest.approx(AT, abs=3.0 * time.sigma)
+    for axis, size in zip("xyz", (0.0, 0.0, 0.3), strict=True):
+        found = jump.unknowns[axis]
+        assert found.value == pytest.approx(size, abs=3.0 * found.sigma)
+
+
+@pytest.mark.slow
 def test_what_all_do_alike_is_said_to_be_common():
     diagnosis = judged(2, 1, at=AT, imu=0, x=0.2, z=0.15).diagnosis()
     (jump,) = (e for e in diagnosis.effects if e.name == "bias_step")

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from onboard.core.vehicle.block_sums import BlockSums
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.effects.effect import Unknown
-from onboard.core.vehicle.fit import BlockSums
 
 BLOCKS, DRAWS = 10, 300
 FLOOR = 2.0
@@ -23,7 +23,7 @@ def lasts(means):
     information = np.full(len(means), 1.0 / len(means))
     theta = float(np.sum(information * means))
     blocks = tuple(
-        BlockSums(np.array([[n]]), np.array([n * (x - theta)]), 0.0, 24)
+        BlockSums(np.array([[n]]), np.array([n * (x - theta)]), 0.0, 24, np.arange(1))
         for n, x in zip(information, means, strict=True)
     )
     unknown = Unknown("x", 0.0, 100.0, FLOOR, "1")

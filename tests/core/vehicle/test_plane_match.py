@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.block_sums import total
 from onboard.core.vehicle.effects.servo_lag import ServoLag
 from onboard.core.vehicle.fit import fitted, summed
 from onboard.core.vehicle.flight import History
@@ -204,7 +205,7 @@ def test_servos_without_a_lag_leave_the_fit_at_a_minimum(seed):
     flight = plane_flight(seed=seed, wind=(-3.4, 7.0), c_drag_p=0.18, reading=1.0, servo_lag=1e-4)
     model = plane_model(flight, PlaneAirframe(), SIGMA)
     fit = likelier(model)
-    score = sum(b.b for b in fit.blocks) + fit.prior * (model.nominal - fit.theta)
+    score = total(fit.blocks, len(fit.theta))[1] + fit.prior * (model.nominal - fit.theta)
     # What a Newton step would still gain, of a chi-square.
     assert score @ np.linalg.solve(fit.information, score) < 0.1
     match = matched(flight)
