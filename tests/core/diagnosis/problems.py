@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.maths.blocks import Block
 from onboard.core.maths.sums import NormalSums
@@ -13,6 +14,9 @@ from onboard.core.model.nuisances import Six
 from onboard.core.model.regressors import Family, Model, Unknown
 
 BLOCK_S = 10.0
+WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}
+"""Candidates and their unknowns."""
+SIX = np.array([1.01, 0.99, 1.02, 0.1, -0.2, 0.05])
 
 
 class Columns(Family):
@@ -84,3 +88,22 @@ def least_squares(problem, free, at, rows=None):
     R = np.linalg.qr(A)[1]
     inverse = np.linalg.inv(R)
     return theta, float(np.sum((c - A @ x) ** 2)), inverse @ inverse.T
+
+
+def families():
+    return [Columns(name, width) for name, width in WIDTHS.items()]
+
+
+def made(rng, *present, size=0.6, noise=1.0, blocks=10, rows=60):
+    """A flight in which these effects act, each unknown by ``size`` or its negative."""
+    theta = np.concatenate([SIX, np.zeros(sum(WIDTHS.values()))])
+    at = 6
+    for name, width in WIDTHS.items():
+        if name in present:
+            theta[at : at + width] = size * rng.choice([-1.0, 1.0], width)
+        at += width
+    return drawn(rng, families(), theta, blocks=blocks, rows=rows, noise=noise)
+
+
+def candidates(problem, names=WIDTHS):
+    return [Candidate(n, problem.columns(n), (5.0,) * len(problem.columns(n))) for n in names]

@@ -14,31 +14,18 @@ from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.estimate.pool import Pool
 from onboard.core.physics.effects.bias_step import Witness
-from tests.core.diagnosis.problems import Columns, Problem, drawn, least_squares
+from tests.core.diagnosis.problems import (
+    SIX,
+    WIDTHS,
+    Problem,
+    candidates,
+    drawn,
+    families,
+    least_squares,
+    made,
+)
 
-WIDTHS = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 3, "f": 1}
-"""Candidates and their unknowns."""
-SIX = np.array([1.01, 0.99, 1.02, 0.1, -0.2, 0.05])
 DRAWS = 120
-
-
-def families():
-    return [Columns(name, width) for name, width in WIDTHS.items()]
-
-
-def made(rng, *present, size=0.6, noise=1.0, blocks=10, rows=60):
-    """A flight in which these effects act, each unknown by ``size`` or its negative."""
-    theta = np.concatenate([SIX, np.zeros(sum(WIDTHS.values()))])
-    at = 6
-    for name, width in WIDTHS.items():
-        if name in present:
-            theta[at : at + width] = size * rng.choice([-1.0, 1.0], width)
-        at += width
-    return drawn(rng, families(), theta, blocks=blocks, rows=rows, noise=noise)
-
-
-def candidates(problem, names=WIDTHS):
-    return [Candidate(n, problem.columns(n), (5.0,) * len(problem.columns(n))) for n in names]
 
 
 def chosen(problem, names=WIDTHS):
