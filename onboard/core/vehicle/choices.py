@@ -79,11 +79,11 @@ class Choices:
 
     def held_out(self, effects: Sequence[str]) -> float:
         """Whitened squares of every fold, each by unknowns of the others; over the inflation."""
-        total = 0.0
+        squares = 0.0
         for fold, x in self.by_fold(effects):
             N, b, s = self._total(fold)
-            total += s - 2.0 * float(b @ x) + float(x @ N @ x)
-        return total / self.fit.scale
+            squares += s - 2.0 * float(b @ x) + float(x @ N @ x)
+        return squares / self.fit.scale
 
     def by_fold(self, effects: Sequence[str]) -> list[tuple[list[int], Array]]:
         """Blocks of each fold, and (m,) unknowns about the fit's by all other blocks."""
