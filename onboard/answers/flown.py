@@ -18,7 +18,7 @@ from onboard.answers.answer import Answer
 from onboard.answers.kept_motion import motion_of
 from onboard.answers.recorded import PAUSE_S, Recorded, later, unanswered
 from onboard.answers.replay import Reading, read
-from onboard.answers.stands import fixes_of, said_to_stand, with_landings
+from onboard.answers.stands import fixes_of, said_to_stand, with_landings, without_flight
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.engine import Engine
@@ -248,6 +248,12 @@ class FlownRecording:
     def derived(self) -> bool:
         """Whether its force is the slope of its velocity, and no accelerometer measured it."""
         return any(r.derived for r in self.source.recordings)
+
+    @property
+    def without_flight(self) -> str:
+        """Why nothing can be said of it where there is no flight to ask about."""
+        table = any(r.kind == "table" for r in self.source.recordings)
+        return without_flight(standing=bool(self.grounded), table=table)
 
     @property
     def autopilot(self) -> str:

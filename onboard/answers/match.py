@@ -54,7 +54,6 @@ SAME: Final = 0.05
 """Share of a number within which two vehicles are the same [use]."""
 DESCRIBING = ("lowest", "capacity", "rms_with_faster")
 """Numbers that tell of the flight, not of the vehicle."""
-NOTHING = "no stretch of flight with trusted GPS, attitude and inertial data"
 CARRIED = (
     "upright rotors turn nearly all the time, and of a plane that they carry there is no model"
 )
@@ -208,7 +207,7 @@ def vehicle_level(
     elif kind in PLANES and unseen(recording.signals):
         why = UNSEEN
     elif flight is None or len(flight) < FEWEST_STEPS:
-        why = CARRIED if carried_s > 0.0 else NOTHING
+        why = CARRIED if carried_s > 0.0 else recording.without_flight
     elif not kind:
         why = "the recording does not say what kind of vehicle it is"
     if why or flight is None:
@@ -254,7 +253,9 @@ def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> 
         raise RecordingError(f"{recording.name}: {UNSEEN}")
     flight, carried_s = _flight(recording, kind, airframe, pieces)
     if flight is None or len(flight) < FEWEST_STEPS:
-        raise RecordingError(f"{recording.name}: {CARRIED if carried_s > 0.0 else NOTHING}")
+        raise RecordingError(
+            f"{recording.name}: {CARRIED if carried_s > 0.0 else recording.without_flight}"
+        )
     doubt = _doubt(recording, pieces)
     if doubt.hopeless:
         raise RecordingError(f"{recording.name}: {doubt}")

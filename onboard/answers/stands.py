@@ -9,8 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.inputs.airborne import Ground
+from onboard.core.inputs.limits import GROUND_M
 from onboard.core.inputs.samples import FIX_3D, GpsFix, Sample, VehicleState
 from onboard.core.maths.arrays import Mask
+from onboard.core.vehicle.limits import MARGIN_S
 
 
 def fixes_of(samples: Sequence[Sample]) -> list[GpsFix]:
@@ -39,7 +41,12 @@ def said_to_stand(samples: Sequence[Sample], fixes: Sequence[GpsFix]) -> Mask:
 
 
 def with_landings(samples: list[Sample], grounded: list[tuple[float, float]]) -> list[Sample]:
-    """The samples, with the word that the vehicle has landed where it was on the ground."""
+    """The samples, with the word that the vehicle has landed where it was on the ground.
+
+    Args:
+        samples: of the recording.
+        grounded: from and to, s, with what margin a landing has: nothing before them is doubtful.
+    """
     if not grounded:
         return samples
     out: list[Sample] = []
@@ -48,9 +55,21 @@ def with_landings(samples: list[Sample], grounded: list[tuple[float, float]]) ->
         if isinstance(sample, GpsFix):
             now = any(a <= sample.t <= b for a, b in grounded)
             if now is not was:
-                out.append(VehicleState(sample.t, landed=now))
+                out.append(VehicleState(sample.t, landed=now, late_s=0.0))
                 was = now
         if isinstance(sample, VehicleState) and sample.landed is not None and was is not None:
             sample = VehicleState(sample.t, sample.armed, was, sample.kind)  # noqa: PLW2901
         out.append(sample)
     return out
+
+
+def without_flight(*, standing: bool, table: bool) -> str:
+    """Why there is no flight to ask about: what was taken for the ground, if anything was."""
+    why = "no stretch of flight with trusted GPS, attitude and inertial data"
+    if not standing:
+        return why
+    why += (
+        f": where it stood, or was still within {GROUND_M:.0f} m of that height, is none, nor are "
+        f"{MARGIN_S:.0f} s to either side"
+    )
+    return f"{why}; airborne = true in the map takes all of it for flight" if table else why

@@ -9,6 +9,9 @@ import pytest
 from onboard.answers import flown as flown_module
 from onboard.answers.flown import Flown
 from onboard.answers.recorded import Recorded, unanswered
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.inputs.limits import TOUCHED_S
 from onboard.core.inputs.samples import (
     AttitudeSample,
     GpsFix,
@@ -101,6 +104,22 @@ def test_a_bounce_is_no_flight_to_either_level():
     fixes = np.concatenate([b.fixes.t for b in made.recorded.sampled(1)])
     assert np.any((fixes > 40.0) & (fixes < 55.0))
     assert not np.any(np.abs(fixes - 60.0) < 1.0)
+
+
+def test_only_an_autopilots_word_of_a_landing_is_late():
+    """What heights tell of a landing has its margin before it, and flight lasts until then."""
+    flight = bounced(shaken=0.0)
+    made = found(flight)
+    stand = made.grounded[-1][0]
+    handed_out = max(b.fixes.t[-1] for b in made.recorded.sampled(1))
+    assert stand - 1.2 < handed_out <= stand
+    calibrator = Calibrator(CalibratorSettings(refine=False))
+    word = [VehicleState(0.0, landed=False), VehicleState(stand, landed=True)]
+    for sample in sorted([*flight, *word], key=lambda s: s.t or 0.0):
+        calibrator.feed(sample)
+    calibrator.finish()
+    handed_out = max(b.fixes.t[-1] for b in calibrator.engine(1).batches)
+    assert stand - TOUCHED_S - 0.3 < handed_out <= stand - TOUCHED_S
 
 
 def test_the_vehicle_level_goes_on_without_what_the_sensor_level_calls_false(monkeypatch):

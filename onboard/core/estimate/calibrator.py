@@ -376,8 +376,8 @@ class Calibrator:
         following = self._ground.after(state)
         ended = bool(self._ground.armed) and following.armed is False
         changed = following.grounded is not self._ground.grounded
-        landed = state.t if following.grounded else math.inf
-        events = self._advance(everything=True, landed=landed) if ended or changed else ()
+        touched = state.t - state.late_s if following.grounded else math.inf
+        events = self._advance(everything=True, touched=touched) if ended or changed else ()
         self._ground = following
         if self.parameters.waiting:  # and not for what was measured until now
             self._assembly.streams.settle()
@@ -387,9 +387,9 @@ class Calibrator:
         self._counts += self._engines.refine()
         return (*events, FlightEnded(state.t))
 
-    def _advance(self, *, everything: bool = False, landed: float = math.inf) -> tuple[Event, ...]:
+    def _advance(self, *, everything: bool = False, touched: float = math.inf) -> tuple[Event, ...]:
         made: dict[int, list[Batch]] = self._assembly.take(
-            self.parameters, everything=everything, grounded=self._ground.grounded, landed=landed
+            self.parameters, everything=everything, grounded=self._ground.grounded, touched=touched
         )
         newest = self._engines.add(made)
         self.flown_s += max(

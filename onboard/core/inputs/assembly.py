@@ -93,7 +93,7 @@ class Assembly:
         *,
         everything: bool = False,
         grounded: bool | None = False,
-        landed: float = np.inf,
+        touched: float = np.inf,
     ) -> dict[int, list[Batch]]:
         """Batches of flight that are complete, by accelerometer; empty most of the time.
 
@@ -104,8 +104,7 @@ class Assembly:
             everything: do not wait for a whole batch.
             grounded: whether the vehicle stands (then nothing is handed out); None: nobody says,
                 the motion decides.
-            landed: when the autopilot said that it had, s; what it may have touched before it did
-                waits for what stands.
+            touched: when it may have touched the ground, s; the rest waits for what stands.
         """
         waiting = self.streams.fixes
         least = LEAST_WAITING_S if everything else self._settings.batch_s
@@ -115,7 +114,7 @@ class Assembly:
         live = self.streams.live
         ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
         if grounded is False:
-            ready = min(ready, landed - TOUCHED_S) if everything else ready - TOUCHED_S
+            ready = min(ready, touched) if everything else ready - TOUCHED_S
         elif grounded is None and not everything:
             ready = min(ready, self._rolling.held(*waiting.motion(ready)))
         if min(ready, waiting.last) - waiting.first < least:

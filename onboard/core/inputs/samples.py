@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
+from onboard.core.inputs.limits import TOUCHED_S
 from onboard.core.maths.arrays import Vector3
 
 
@@ -93,6 +94,7 @@ class GpsFix:
 class VehicleState:
     """Armed and landed flags; None where the source does not say.
 
+    ``late_s`` is how late the word may be: it may have touched the ground so long before, s.
     ``kind`` is ``copter``, ``plane``, ``rover``, ...; empty where the source does not say.
     """
 
@@ -100,6 +102,7 @@ class VehicleState:
     armed: bool | None = None
     landed: bool | None = None
     kind: str = ""
+    late_s: float = TOUCHED_S
 
 
 @dataclass(frozen=True, slots=True)
