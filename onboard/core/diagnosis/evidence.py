@@ -37,7 +37,7 @@ from onboard.core.diagnosis.records import (
 from onboard.core.diagnosis.regimes import (
     regime_residuals,
 )
-from onboard.core.diagnosis.score import least, surprise
+from onboard.core.diagnosis.score import surprise
 from onboard.core.diagnosis.selection import Fit
 from onboard.core.diagnosis.undecided import in_words, left_open, undecided
 from onboard.core.estimate.calibration_status import too_far
@@ -103,7 +103,7 @@ class Judge:
         families = self.final.families
         ladder, fits = self.final.ladder()
         before, after = fits[0], fits[-1]
-        effects = self.findings.made(nuisances, self.evidence.doubts) + self.excluded
+        effects = self.findings.made(self.imu, self.evidence.doubts) + self.excluded
         every = inconstant(self.final)
         # What contradicts the model bends what else there is to doubt.
         changing = tuple(c for c in every if c.contradicts) or every
@@ -238,7 +238,8 @@ class Judge:
             close = [r.name for r in e.confounders if r.delta_bic < CLEARLY and r.name != e.name]
             if close and e.name in by_name:
                 out.append(Ambiguity((e.name, *close), by_name[e.name].apart))
-            if e.name in nuisance_kinds() and self.final.score(e.name, self.final.all) < least():
+            kind = nuisance_kinds().get(e.name)
+            if kind is not None and not self.final.that_tells(kind).holds(e.name):
                 # It holds only with the antenna where it was told to be.
                 out += [
                     Ambiguity((e.name, k.effect), k.apart)

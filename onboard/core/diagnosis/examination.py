@@ -197,6 +197,17 @@ class Examination(Engine):
         made.once()
         return made
 
+    def as_seen(self) -> Examination:
+        """The same flight and columns beside slow errors of which no more lasts than was seen.
+
+        What is one number for a flight cannot be told from an error that is another one after
+        minutes, and the time after which it is another one is no such thing at a floor.
+        """
+        made = Examination(self, self._own, t0=self.point.skew_from, start=self)
+        made.noise = self.noise.as_seen
+        made.once()
+        return made
+
     @property
     def log_likelihood(self) -> float:
         """Of the whole flight in the last pass, the unknowns integrated out with their prior."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from onboard.core.diagnosis.nuisance_effects import (
 )
 from onboard.core.diagnosis.records import Rung, Series
 from onboard.core.diagnosis.regimes import Residuals, axis_of, located
+from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.selection import Fit, Fitter
 from onboard.core.estimate.calibration_record import timing_of
 from onboard.core.estimate.gps_clock import fix_clock
@@ -58,6 +60,15 @@ class FinalModel:
         self.index = engine.model.index
         self.all = list(range(engine.model.size))
         self._axes = self._body_axes()
+
+    @cached_property
+    def as_seen(self) -> FinalModel:
+        """The same beside slow errors of which no more lasts than was seen."""
+        return FinalModel(self.engine.as_seen(), self.families, self.origin, self.parameters)
+
+    def that_tells(self, kind: type[Effect]) -> FinalModel:
+        """The model by which an effect is told that is in every model."""
+        return self.as_seen if kind.lasts else self
 
     def nuisances(self, imu: int) -> NuisanceFit:
         """The unknowns of every model, as effects measure themselves by them."""
@@ -129,6 +140,10 @@ class FinalModel:
         rest = [i for i in among if i not in target.index]
         absent, with_it = self.fitter.fit(rest, self.held(columns)), self.fitter.fit(among)
         return target.score(self.fitter, absent, with_it)
+
+    def holds(self, name: str) -> bool:
+        """Whether timing or a constant attitude error is no chance beside all other columns."""
+        return self.score(name, self.all) >= least()
 
     @staticmethod
     def share(without: Fit, with_it: Fit) -> float:

@@ -17,7 +17,7 @@ from onboard.core.estimate.calibration_model import reversed_of
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
-from onboard.core.physics.effect import Cure, Effect, NuisanceFit
+from onboard.core.physics.effect import Cure, Effect
 from onboard.core.physics.effects.bias_step import SHARED_CURE
 from onboard.core.physics.finding import Confounder, Finding, Quantity
 
@@ -29,18 +29,20 @@ class Findings:
         """Take the final model, the choice that led to it, and what the choice is counted from."""
         self._final, self._choice, self._full_point = final, choice, full_point
 
-    def made(self, nuisances: NuisanceFit, doubts: Mapping[str, Sequence[str]]) -> list[Finding]:
+    def made(self, imu: int, doubts: Mapping[str, Sequence[str]]) -> list[Finding]:
         """Everything that was found in the sums.
 
         Args:
-            nuisances: the unknowns of every model.
+            imu: which accelerometer.
             doubts: effects of them that something else could stand for.
         """
         # A name has one effect: what stands beside regressors of its own is their consequence.
         named = {f.effect for f in self._final.families}
         out = [
             self._nuisance(name, quantities, cure)
-            for name, (quantities, cure) in nuisance_effects(nuisances).items()
+            for name, (quantities, cure) in nuisance_effects(
+                lambda kind: self._final.that_tells(kind).nuisances(imu)
+            ).items()
             if name not in doubts and name not in named and self._holds(name)
         ]
         return out + [self._effect(f) for f in self._final.families if not self._reversed(f)]
@@ -51,11 +53,11 @@ class Findings:
         return bool(reversed_of(made, (f,), solution.theta, solution.covariance))
 
     def _nuisance(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
-        final = self._final
-        columns = nuisance_kinds()[name].in_every_model
+        kind = nuisance_kinds()[name]
+        final, columns = self._final.that_tells(kind), kind.in_every_model
         index = [final.index[c] for c in columns]
         held = final.held(columns)
-        made = self._record(name, quantities, index, held, cure)
+        made = self._record(final, name, quantities, index, held, cure)
         return replace(made, confounders=self._nuisance_confounders(name, columns))
 
     def _holds(self, name: str) -> bool:
@@ -64,7 +66,7 @@ class Findings:
         With the antenna's place free, or with the antenna where it was told to be: a few
         centimetres of it could do instead on some flights, which is said besides.
         """
-        final = self._final
+        final = self._final.that_tells(nuisance_kinds()[name])
         among = (final.all, final.with_configured_antenna())
         return any(final.score(name, columns) >= least() for columns in among)
 
@@ -100,7 +102,7 @@ class Findings:
         held = final.engine.absent
         common = self._choice.common
         cure = f.cured(values) if common is None or f.onset != common.onset else SHARED_CURE
-        made = self._record(f.effect, quantities, index, held, cure)
+        made = self._record(final, f.effect, quantities, index, held, cure)
         made = replace(
             made,
             confounders=self._confounders(f),
@@ -124,13 +126,13 @@ class Findings:
 
     def _record(
         self,
+        final: FinalModel,
         name: str,
         quantities: dict[str, Quantity],
         index: Sequence[int],
         held: Array,
         cure: Cure,
     ) -> Finding:
-        final = self._final
         without, with_it = final.without(index, held)
         rest = [i for i in final.all if i not in index]
         theta = final.solution.theta

@@ -7,7 +7,7 @@ exact.  Each becomes an effect past a size that it states itself
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 
 from onboard.core.maths.arrays import Array
@@ -36,9 +36,13 @@ def constant_unknowns() -> list[str]:
     return [u for k in nuisance_kinds().values() for u in k.in_every_model if u not in timing]
 
 
-def nuisance_effects(nuisances: NuisanceFit) -> Measured:
-    """Effects that are always in the model, and large enough and sure enough to report."""
-    measured = {name: kind.measured(nuisances) for name, kind in nuisance_kinds().items()}
+def nuisance_effects(nuisances: Callable[[type[Effect]], NuisanceFit]) -> Measured:
+    """Effects that are always in the model, and large enough and sure enough to report.
+
+    Args:
+        nuisances: of the fit that tells an effect.
+    """
+    measured = {name: kind.measured(nuisances(kind)) for name, kind in nuisance_kinds().items()}
     return {name: found for name, found in measured.items() if found is not None}
 
 

@@ -53,18 +53,17 @@ def _large(choice: Choice, full: Examination, calibrator: Calibrator, imu: int) 
     solution = Solution(
         fit.theta, covariance, fitter.sums.N, 1.0, contradicts=False, nis=1.0, rows=1.0
     )
-    return nuisance_effects(
-        NuisanceFit(
-            timing=timing_of(full, solution),
-            theta=fit.theta,
-            sigma=np.sqrt(np.diag(covariance)),
-            index=fitter.model.index,
-            point=full.point,
-            parameters=calibrator.parameters,
-            imu=imu,
-            clock=fix_clock(calibrator.parameters, full.batches),
-        )
+    nuisances = NuisanceFit(
+        timing=timing_of(full, solution),
+        theta=fit.theta,
+        sigma=np.sqrt(np.diag(covariance)),
+        index=fitter.model.index,
+        point=full.point,
+        parameters=calibrator.parameters,
+        imu=imu,
+        clock=fix_clock(calibrator.parameters, full.batches),
     )
+    return nuisance_effects(lambda _: nuisances)
 
 
 def _target(choice: Choice, full: Examination, name: str, told: float) -> tuple[Candidate, Array]:

@@ -73,6 +73,21 @@ class NoiseLevels:
         return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
 
     @property
+    def as_seen(self) -> NoiseLevels:
+        """The same with a heading that is forgotten as soon as what was seen of its error is.
+
+        The floor of a slow error is none that a flight has, and one that is many times too large
+        has to be as many times slower to be as smooth as what there is: the time that is found with
+        it is no time.  So a floor counts with the time that such errors usually have, and what is
+        beyond it with the one that was found; both powers at the lowest frequencies, by which a
+        mean is unsure, add up.
+        """
+        floor, whole = LIMITS["heading"][0] ** 2, self.heading**2
+        beyond = max(whole - floor, 0.0) / whole
+        usual = (1.0 - beyond) * USUAL.heading_time
+        return replace(self, heading_time=usual + beyond * self.heading_time)
+
+    @property
     def at_highest(self) -> tuple[str, ...]:
         """Levels as high as noise of their kind goes; not times and ratios, which are no noise."""
         return tuple(

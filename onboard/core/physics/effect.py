@@ -145,6 +145,8 @@ class Effect(Family):
         of_attitude: it is the recorded attitude that is wrong.
         trades: it looks much like a nuisance of every model, and one grows with the other.
         in_every_model: its unknowns that are estimated anyway.
+        lasts: a nuisance of every model errs slowly as it does: it is told beside as little of that
+            as was seen.
         least: size of a timing unknown from which it counts, s; None for what is no timing.
         constant: what it is a size of, in words, where that is one and the same all flight long;
             empty where nothing is asked of that.
@@ -178,6 +180,7 @@ class Effect(Family):
     positive: ClassVar[bool] = False
     in_every_model: ClassVar[tuple[str, ...]] = ()
     trades: ClassVar[bool] = False
+    lasts: ClassVar[bool] = False
     least: ClassVar[float | None] = None
     constant: ClassVar[str] = ""
     of_flight: ClassVar[bool] = False

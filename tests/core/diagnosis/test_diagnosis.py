@@ -40,10 +40,16 @@ def truth_of(record, first_sample):
             return {"xy": 0.03, "xz": 0.0, "yx": 0.0, "yz": 0.0, "zx": 0.0, "zy": 0.02}
         case "scale_nonlinearity":
             return dict(zip("xyz", record["per_g"], strict=True))
+        case "heading_error":
+            return {"yaw": record["yaw_rad"]}
+        case "imu_delay":
+            return {"delay": record["delay_s"]}
+        case "vibration_rectification":
+            return dict(zip("xyz", record["coef"], strict=True))
     raise AssertionError(record)
 
 
-@pytest.mark.parametrize("name", ["a03", "b04", "i01", "i03", "i05"])
+@pytest.mark.parametrize("name", ["a03", "b04", "i01", "i02", "i03", "i04", "i05", "i06"])
 def test_the_concealed_effect_is_named_and_measured(recordings, answers, name):
     got, first = diagnosed(recordings, name)
     (record,) = answers[name]["effects"]

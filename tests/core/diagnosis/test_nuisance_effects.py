@@ -67,7 +67,7 @@ def nuisances(
 
 
 def found(**numbers):
-    return nuisance_effects(nuisances(**numbers))
+    return nuisance_effects(lambda _: nuisances(**numbers))
 
 
 LEAST = {

@@ -178,3 +178,23 @@ def test_a_bounded_step_leaves_nothing_to_gain():
         assert np.abs(left[inside]).max(initial=0.0) < 0.02
         assert np.all(left[x == low] < 0.02)
         assert np.all(left[x == high] > -0.02)
+
+
+def test_a_floor_of_the_heading_has_the_usual_time_whatever_was_found():
+    """A process that a flight does not have is smooth only by being slow."""
+    floor = LIMITS["heading"][0]
+    for found in (2.0, 50.0, 600.0):
+        made = replace(USUAL, heading=floor, heading_time=found).as_seen
+        assert made == replace(USUAL, heading=floor)
+
+
+@pytest.mark.parametrize("found", [2.0, 50.0, 600.0])
+def test_what_the_heading_has_beyond_its_floor_lasts_as_long_as_was_found(found):
+    """Powers at the lowest frequencies, variance times time, of both parts add up."""
+    floor = LIMITS["heading"][0]
+    for whole in (0.06, 0.2, 0.6):
+        levels = replace(USUAL, heading=whole, heading_time=found)
+        power = floor**2 * USUAL.heading_time + (whole**2 - floor**2) * found
+        assert whole**2 * levels.as_seen.heading_time == pytest.approx(power)
+        assert levels.as_seen == replace(levels, heading_time=levels.as_seen.heading_time)
+    assert levels.as_seen.heading_time == pytest.approx(found, rel=0.02)

@@ -33,6 +33,7 @@ class HeadingError(Effect):
     apart = "accelerate hard on several headings"
     of_attitude = True
     in_every_model: ClassVar[tuple[str, ...]] = ("heading",)
+    lasts = True
 
     @classmethod
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:

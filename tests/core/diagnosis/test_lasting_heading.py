@@ -1,0 +1,49 @@
+"""A heading that is off all flight long is told from one that errs for a while, as headings do."""
+
+import pytest
+
+from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.settings import CalibratorSettings
+from onboard.mavlink.decode import Decoder
+from sitl.builtin import effects as fx
+from sitl.builtin.truth import GpsTruth, random_imus
+from sitl.recording import FlightSpec, fly_messages
+
+OFF = 0.1
+"""rad; six degrees: twice what the slow error of a heading may be at any time."""
+
+
+def diagnosed(vehicle, seed, *effects):
+    spec = FlightSpec(
+        vehicle=vehicle,
+        duration=150.0,
+        seed=seed,
+        imus=random_imus(seed),
+        gps=GpsTruth(delay=0.04),
+        effects=effects,
+    )
+    decoder = Decoder(system=1, component=1)
+    made = Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
+    for _, message in fly_messages(spec):
+        for sample in decoder.decode(message):
+            made.feed(sample)
+    made.finish()
+    return diagnose(made, 1)
+
+
+@pytest.mark.parametrize(("vehicle", "seed"), [("copter", 41), ("plane", 42)])
+@pytest.mark.parametrize("off", [OFF, -OFF])
+def test_a_heading_that_is_off_all_along_is_named(vehicle, seed, off):
+    made = diagnosed(vehicle, seed, fx.HeadingError(yaw=off))
+    (effect,) = (e for e in made.effects if e.name == "heading_error")
+    yaw = effect.unknowns["yaw"]
+    assert abs(yaw.value - off) <= 3.0 * yaw.sigma
+    assert yaw.sigma < 0.25 * OFF
+    assert not any("heading_error" in a.names for a in made.ambiguous)
+
+
+@pytest.mark.parametrize(("vehicle", "seed"), [("copter", 41), ("plane", 42)])
+def test_a_heading_that_is_right_is_not(vehicle, seed):
+    made = diagnosed(vehicle, seed)
+    assert not any(e.name == "heading_error" for e in made.effects)
