@@ -115,6 +115,8 @@ def accepted(fitter: Fitter, before: Fit, after: Fit, c: Candidate) -> bool:
     # What nothing has a name for may be taken all the same, and is told of as what cannot be.
     if not _small_enough(fitter, after, c) or (c.mirrored and not possible(fitter, after, c)):
         return False
+    if not _there(fitter, after, c):
+        return False
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     if c.jump and np.max(np.abs(value)) > c.worth:
         # What is learned over the whole flight lies in between, and nearer to both.
@@ -139,6 +141,14 @@ def possible(fitter: Fitter, after: Fit, c: Candidate) -> bool:
     value = after.theta[c.sizes] - fitter.absent[c.sizes]
     sigma = np.sqrt(np.diag(fitter.covariance(after))[c.sizes])
     return bool(np.all(value >= -BEYOND * sigma))
+
+
+def _there(fitter: Fitter, after: Fit, c: Candidate) -> bool:
+    """Whether it has a size, where its shapes are shares of one."""
+    if c.columns is None:
+        return True
+    value = after.theta[c.sizes] - fitter.absent[c.sizes]
+    return c.columns.there(value, np.sqrt(np.diag(fitter.covariance(after))[c.sizes]))
 
 
 def _missed(fitter: Fitter, before: Fit, c: Candidate) -> bool:

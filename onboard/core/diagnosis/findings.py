@@ -45,12 +45,15 @@ class Findings:
             ).items()
             if name not in doubts and name not in named and self._holds(name)
         ]
-        return out + [self._effect(f) for f in self._final.families if not self._reversed(f)]
+        return out + [self._effect(f) for f in self._final.families if not self._another(f)]
 
-    def _reversed(self, f: Effect) -> bool:
-        """Whether it surely has the sign that nature does not allow it: then it is another one."""
+    def _another(self, f: Effect) -> bool:
+        """Whether it has the sign that nature does not allow it, or no size: then it is another."""
         made, solution = self._final.engine.model, self._final.solution
-        return bool(reversed_of(made, (f,), solution.theta, solution.covariance))
+        index = self._final.engine.indices(f)[: len(f.keys)]
+        sigma = np.sqrt(np.diag(solution.covariance))[index]
+        reverse = reversed_of(made, (f,), solution.theta, solution.covariance)
+        return bool(reverse) or not f.there(solution.theta[index], sigma)
 
     def _nuisance(self, name: str, quantities: dict[str, Quantity], cure: Cure) -> Finding:
         kind = nuisance_kinds()[name]

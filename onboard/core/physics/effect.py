@@ -26,6 +26,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from onboard.core.estimate.gps_clock import FixClock
+from onboard.core.estimate.limits import BEYOND
 from onboard.core.estimate.result import Estimate
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.segments import Batch
@@ -231,6 +232,15 @@ class Effect(Family):
     def shaped(self) -> bool:
         """Whether it has unknowns of its shape."""
         return len(self.unknowns) > len(self.keys)
+
+    def there(self, value: Array, sigma: Array) -> bool:
+        """Whether it has a size: of what is never negative, shapes are shares of it.
+
+        Args:
+            value: (k,) sizes, without shapes.
+            sigma: (k,) theirs.
+        """
+        return not (self.positive and self.shaped) or bool(np.any(value > BEYOND * sigma))
 
     # -- how it is looked for -------------------------------------------------------------------
 

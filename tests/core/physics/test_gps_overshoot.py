@@ -17,7 +17,9 @@ from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.model.around import AROUND_SPAN_S, Past
 from onboard.core.model.smoothing import Gained
 from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.accelerometer_hysteresis import AccelerometerHysteresis
 from onboard.core.physics.effects.gps_overshoot import DAMPING, NATURAL_HZ, GpsOvershoot
+from onboard.core.physics.effects.temperature_drift import TemperatureDrift
 from onboard.core.physics.octaves import WEIGHTS
 from sitl.builtin.effects import GpsOvershoot as Concealed
 from sitl.builtin.gps import _loop
@@ -103,3 +105,20 @@ def test_a_flight_that_conceals_it_is_explained_by_its_name(vehicle, hertz):
     off = np.array(said.calibration.scale) - truth.scale
     assert np.all(np.abs(off) < 3.5 * np.array(said.calibration.scale_sigma))
     assert said.mismatch.held_out_after < said.mismatch.held_out_before
+
+
+def test_shapes_without_a_size_are_no_loop():
+    """No loop has less than nothing, so what three of them share is nothing without a sum."""
+    made = GpsOvershoot(Origin(t0=0.0))
+    sigma = np.array([1.4e-4])
+    assert not made.there(np.array([-5e-5]), sigma)
+    assert not made.there(np.array([4e-4]), sigma)
+    assert made.there(np.array([5e-4]), sigma)
+
+
+def test_an_axis_with_hysteresis_is_enough_and_a_slope_may_be_none_of_a_curve():
+    sigma = np.full(3, 0.01)
+    made = AccelerometerHysteresis(Origin(t0=0.0))
+    assert made.there(np.array([0.0, 0.1, -0.01]), sigma)
+    assert not made.there(np.array([0.02, -0.01, 0.0]), sigma)
+    assert TemperatureDrift(Origin(t0=0.0)).there(np.zeros(3), sigma)
