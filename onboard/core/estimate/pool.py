@@ -46,8 +46,10 @@ class Pool:
         centres = np.geomspace(least, float(ratio.max()), CENTRES)
         above = ratio > least
         seen = ratio[above] / centres[:, None]
-        inside, below = _Counts(count[above]), _Counts(count[~above])
-        chances = [_log_likelihood(seen, inside, below, centres, f, least) for f in FREEDOMS]
+        inside = _Ratios(count[above], seen, -np.log(centres)[:, None])
+        under = BELOW[:, None] * (least / centres)[:, None, None]
+        below = _Ratios(count[~above], under, np.log(under * _WIDTHS[:, None]))
+        chances = [_log_likelihood(inside, below, f) for f in FREEDOMS]
         i, j = np.unravel_index(int(np.argmax(chances)), (len(FREEDOMS), CENTRES))
         return cls(float(centres[j]), FREEDOMS[i])
 
@@ -63,36 +65,42 @@ BELOW = np.geomspace(1e-3, 1.0, 24)
 """Shares of the least centre at which the density below it is summed."""
 
 
-class _Counts:
-    """How many blocks count, (k,), and what of a density depends on nothing else."""
+_APART = np.diff(np.log(BELOW), prepend=math.log(BELOW[0]), append=math.log(BELOW[-1]))
+_WIDTHS = 0.5 * (_APART[:-1] + _APART[1:])
+"""What each of them stands for in an integral over their logarithm, by trapezoids."""
 
-    __slots__ = ("_front", "half", "n")
 
-    def __init__(self, n: Array) -> None:
-        self.n, self.half = n, 0.5 * n
-        self._front = -np.array([math.lgamma(h) for h in self.half])
+class _Ratios:
+    """Ratios ``u`` (..., k) for which so many blocks count, (k,): how dense they are.
 
-    def log_density(self, u: Array, freedom: float) -> Array:
+    What does not change with the freedom is worked out once, ``more`` added to it.
+    """
+
+    __slots__ = ("_front", "_half", "_n", "_u")
+
+    def __init__(self, n: Array, u: Array, more: Array) -> None:
+        self._n, self._half, self._u = n, 0.5 * n, u
+        front = self._half * np.log(n) - np.array([math.lgamma(h) for h in self._half])
+        self._front = front + (self._half - 1.0) * np.log(u) + more
+
+    def log_density(self, freedom: float) -> Array:
         """Of Fisher's F with these and ``freedom`` degrees; of chi-square over n without end."""
-        n, half, front = self.n, self.half, self._front
+        half = self._half
         if math.isinf(freedom):
-            front = front + half * np.log(half)
-            tail = half * u
-        else:
-            front = front + np.array([math.lgamma(h + 0.5 * freedom) for h in half])
-            front += half * np.log(n / freedom) - math.lgamma(0.5 * freedom)
-            tail = (half + 0.5 * freedom) * np.log1p(n * u / freedom)
-        out: Array = front + (half - 1.0) * np.log(u) - tail
+            out: Array = self._front - half * (math.log(2.0) + self._u)
+            return out
+        total = half + 0.5 * freedom
+        front = np.array([math.lgamma(h) for h in total]) - math.lgamma(0.5 * freedom)
+        out = np.log1p(self._n / freedom * self._u)
+        out *= -total
+        out += self._front
+        out += front - half * math.log(freedom)
         return out
 
 
-def _log_likelihood(
-    seen: Array, inside: _Counts, below: _Counts, centres: Array, freedom: float, least: float
-) -> Array:
-    """Of ratios above ``least``, over each of the centres, (c, j), and of those below it: (c,)."""
-    density = inside.log_density(seen, freedom)
-    out: Array = np.sum(density - np.log(centres)[:, None], axis=1)
-    u = BELOW[:, None] * (least / centres)[:, None, None]
-    under = np.trapezoid(np.exp(below.log_density(u, freedom)) * u, np.log(BELOW), axis=1)
+def _log_likelihood(inside: _Ratios, below: _Ratios, freedom: float) -> Array:
+    """Of ratios above the least, over each of the centres, and of those below it: (c,)."""
+    out: Array = inside.log_density(freedom).sum(axis=1)
+    under = np.exp(below.log_density(freedom)).sum(axis=1)
     out += np.log(np.maximum(under, TINY)).sum(axis=1)
     return out

@@ -119,12 +119,20 @@ class Scatter:
         found = (self._scores @ X) ** 2
         expected = np.empty_like(found)
         for part, N in self._blocks.information():
-            if self._index is not None:
-                N = N[:, self._index][:, :, self._index]  # noqa: PLW2901 - of the fit's unknowns
-            NX = N @ X
+            NX = self._times(N, X)
             followed = np.einsum("bmk,bmk->bk", NX, self.inverse @ NX)
             expected[part] = np.einsum("mk,bmk->bk", X, NX) - followed
         return found, np.maximum(expected, 0.0)
+
+    def _times(self, N: Array, X: Array) -> Array:
+        """(b, m, k) information (b, n, n) of the fit's unknowns, times ``X`` (m, k)."""
+        if self._index is None:
+            return N @ X
+        # Fewer directions than unknowns: to take the fit's out of N costs more than these.
+        every = np.zeros((N.shape[1], X.shape[1]))
+        every[self._index] = X
+        out: Array = (N @ every)[:, self._index]
+        return out
 
 
 def _counted(expected: Array) -> Array:

@@ -17,6 +17,7 @@ of a segment may stand still, and a quarter of it be a flip.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.filter.limits import SUDDEN
 from onboard.core.inputs.segments import Segment
@@ -44,22 +45,24 @@ def missed_between(segment: Segment, start: Array, end: Array) -> Array:
         (K, 6) of velocity, (m/s)^2, and of turn, rad^2, both by body axes.
     """
     out = np.zeros((len(start), 6))
+    at, axis, var = segment.once(_sudden)
+    step = np.searchsorted(end, at)
+    inside = (at >= start[0]) & (step < len(end))
+    np.add.at(out, (step[inside], axis[inside]), var[inside])
+    return out
+
+
+def _sudden(segment: Segment) -> tuple[Array, NDArray[np.intp], Array]:
+    """When samples are no noise but something sudden (s), on which of six axes; variances."""
     t = segment.t
-    x = np.concatenate([segment.raw_s @ segment.R_bs.T, segment.w_b], axis=1)
     if len(t) <= len(NEIGHBOURS):
-        return out
+        return np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(0)
+    x = np.concatenate([segment.raw_s @ segment.R_bs.T, segment.w_b], axis=1)
     miss = misses(t, x)
     typical = np.quantile(np.abs(miss), 0.75, axis=0) / NORMAL_THREE_QUARTERS
     where, axis = np.nonzero(np.abs(miss) > SUDDEN * typical)
-    if not len(where):
-        return out
-    at = t[where + 2]
     h = 0.5 * (t[where + 3] - t[where + 1])
-    step = np.searchsorted(end, at)
-    inside = (at >= start[0]) & (step < len(end))
-    var = OF_A_JUMP * (h * miss[where, axis]) ** 2
-    np.add.at(out, (step[inside], axis[inside]), var[inside])
-    return out
+    return t[where + 2], axis, OF_A_JUMP * (h * miss[where, axis]) ** 2
 
 
 def misses(t: Array, x: Array) -> Array:

@@ -13,7 +13,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
-from onboard.core.filter.regressor_noise import sample_noise_density
+from onboard.core.filter.regressor_noise import noise_density
 from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
 from onboard.core.filter.uncertainty import Covariance, Information, Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
@@ -305,9 +305,7 @@ class Pass:
             return
         # What looks like noise sample by sample may be a tone that integrates to nothing; the
         # velocity's random walk, found from the residuals, is all that it can amount to.
-        density = np.minimum(
-            sample_noise_density(segment.t, segment.raw_s), self.filter.bank[0].force_walk ** 2
-        )
+        density = np.minimum(segment.once(noise_density), self.filter.bank[0].force_walk ** 2)
         at = self.model.slices["six"].start
         # The Gram is by body axes; the sensor's are permuted or mixed by R_bs.
         sensor = (segment.R_bs**2).T @ gram

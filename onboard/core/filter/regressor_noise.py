@@ -11,8 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.filter.limits import FEWEST_NOISE_MEANS, NOISE_MEAN_S
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.medians import NORMAL_MEDIAN
+
+
+def noise_density(segment: Segment) -> Array:
+    """That of a segment's samples: :func:`sample_noise_density`."""
+    return sample_noise_density(segment.t, segment.raw_s)
 
 
 def sample_noise_density(t: Array, raw: Array) -> Array:

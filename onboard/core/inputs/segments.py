@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from onboard.core.maths.interpolation import Hermite
 PARTS = 6
 """Into which the time from one attitude sample to the next is cut: 0.1 s at the longest, within
 which no vehicle cones by a milliradian [physics]."""
+Told = TypeVar("Told")
 Signal: TypeAlias = tuple[Array, Array]
 """A slow signal: times (j,), s, and values (j,) or (j, k)."""
 SLOW_SIGNALS = {
@@ -101,6 +103,13 @@ class Segment:
     slow: dict[str, Signal] = field(default_factory=dict)
     lever_arm_b: Array = field(default_factory=lambda: np.zeros(3))
     gyro_followed: bool = False
+    _told: dict[object, object] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def once(self, of: Callable[[Segment], Told]) -> Told:
+        """What a function says of the samples, worked out once: every pass asks again."""
+        if of not in self._told:
+            self._told[of] = of(self)
+        return cast("Told", self._told[of])
 
     def interpolant(self) -> Hermite:
         """Interpolant of (rate, raw) stacked to (n, 6)."""

@@ -23,7 +23,6 @@ from onboard.core.model.response import Response
 from onboard.core.model.smoothing import Gained
 from onboard.core.model.spread import (
     Spread,
-    among,
     nodes_within,
     place_weights,
     reaches,
@@ -207,8 +206,9 @@ class _Followed:
             self._maker.signals(t),
             self._R[::each],
             R_epoch,
-            among(len(t), at, velocity_weights(since, step, window, apart, shares)),
-            among(len(t), at, place_weights(since, step, window)),
+            at,
+            velocity_weights(since, step, window, apart, shares),
+            place_weights(since, step, window),
         )
 
     def swing(self, now: Signals, window: float) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.smoothing import SPREAD, between_two, weight_of_two
 
@@ -35,13 +36,15 @@ class Spread:
         nodes: signals, S = (n,).
         R: (n, 3, 3) body axes at the nodes to those that do not turn.
         R_epoch: (K, 3, 3) those of the epochs to the same.
-        velocity: (K, n) s.
-        place: (K, n) s^2.
+        at: (K, b) numbers of the nodes in a row about each epoch, some of which there may not be.
+        velocity: (K, b) s, weights of these.
+        place: (K, b) s^2.
     """
 
     nodes: Signals
     R: Array
     R_epoch: Array
+    at: NDArray[np.intp]
     velocity: Array
     place: Array
 
@@ -51,13 +54,21 @@ class Spread:
         Args:
             acceleration: (n, 3, m) at the nodes, body axes, m/s^2 per unit.
         """
+        loops = compiled_loops()
         n, _, m = acceleration.shape
+        K = len(self.at)
+        if loops is not None:
+            one, two, between = np.zeros((K, 3, m)), np.zeros((K, 3, m)), np.empty((n, 3, m))
+            turns, first = (plain(self.R), plain(self.R_epoch)), np.ascontiguousarray(self.at[:, 0])
+            of = plain(self.velocity), plain(self.place), plain(acceleration)
+            loops.spread(*turns, first, *of, between, one, two)
+            return one, two
+        there = np.clip(self.at, 0, n - 1)
+        weights = np.where(there == self.at, np.stack((self.velocity, self.place)), 0.0)
         turned = (self.R @ acceleration).reshape(n, 3 * m)
-        back = np.swapaxes(self.R_epoch, -1, -2)
-        velocity, place = (
-            back @ (weights @ turned).reshape(-1, 3, m) for weights in (self.velocity, self.place)
-        )
-        return velocity, place
+        both = weights.swapaxes(0, 1) @ turned[there]
+        back = np.swapaxes(self.R_epoch, -1, -2)[:, None] @ both.reshape(K, 2, 3, m)
+        return back[:, 0], back[:, 1]
 
 
 def reaches(window: float, apart: float, h: Array) -> tuple[float, float]:
@@ -76,15 +87,6 @@ def nodes_within(reach: tuple[float, float], epoch: Array, step: float) -> NDArr
     """
     before, after = (int(r / step) + 2 for r in reach)
     return np.rint(epoch).astype(np.intp)[:, None] + np.arange(-before, after + 1)
-
-
-def among(n: int, at: NDArray[np.intp], weights: Array) -> Array:
-    """(K, n) weights (K, b) of nodes ``at`` (K, b), where there are such; zero elsewhere."""
-    out = np.zeros((len(at), n))
-    k, j = np.nonzero((at >= 0) & (at < n))
-    node = at[k, j]
-    out[k, node] = weights[k, j]
-    return out
 
 
 def velocity_weights(since: Array, step: float, window: float, apart: float, h: Array) -> Array:

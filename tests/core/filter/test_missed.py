@@ -1,5 +1,7 @@
 """What samples miss, against what a curve through samples of a known signal is off by."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -103,3 +105,19 @@ def test_few_samples_say_nothing(n):
     t = H * np.arange(n)
     segment = segment_of(t, np.zeros((n, 3)), np.zeros((n, 3)))
     assert not missed_between(segment, t[:1], t[-1:]).any()
+
+
+def test_what_samples_say_is_asked_once_and_of_other_samples_anew():
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 4.0, 0.02)
+    segment = segment_of(t, noise(rng, len(t)), 1e-3 * rng.normal(size=(len(t), 3)))
+    asked = []
+
+    def first(of):
+        asked.append(of)
+        return float(of.raw_s[0, 0])
+
+    assert segment.once(first) == segment.once(first) == segment.raw_s[0, 0]
+    other = replace(segment, raw_s=segment.raw_s + 1.0)
+    assert other.once(first) == segment.raw_s[0, 0] + 1.0
+    assert len(asked) == 2

@@ -95,6 +95,21 @@ def test_nodes_and_integrals_are_the_same(seed):
         np.testing.assert_allclose(other, one, atol=1e-10 * (1.0 + np.abs(one).max()))
 
 
+@given(SEEDS, st.floats(0.05, 0.9), st.sampled_from([0.0, 0.4]))
+@settings(max_examples=15, deadline=None)
+def test_what_a_receiver_makes_of_accelerations_is_the_same(seed, window, lag):
+    rng = np.random.default_rng(seed)
+    flown = segment(rng)
+    # Some epochs so near the ends that not all nodes about them are there.
+    epoch = np.sort(rng.uniform(flown.t[0] + 0.7, flown.t[-1] - 0.7, 8))
+    maker = NodeMaker(flown, np.zeros(3), np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+    made = around(maker, epoch, window, None, np.array([0.1, 0.2, 0.0, lag])).spread
+    x = rng.normal(size=(len(made.R), 3, 5))
+    for one, other in zip(*both_ways(lambda: made.of(x)), strict=True):
+        assert one.shape == (8, 3, 5)
+        np.testing.assert_allclose(other, one, atol=1e-12 * (1.0 + np.abs(one).max()))
+
+
 @given(SEEDS, st.integers(1, 300))
 @settings(max_examples=30, deadline=None)
 def test_what_is_dragged_is_the_same(seed, n):

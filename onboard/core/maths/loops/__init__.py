@@ -6,7 +6,7 @@ held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
 """
 
 from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
-from onboard.core.maths.loops.integrals import gained, integrals, twice
+from onboard.core.maths.loops.integrals import gained, integrals, spread, twice
 from onboard.core.maths.loops.kalman import kalman_errors
 from onboard.core.maths.loops.turns import attitudes, turns_in_a_row
 
@@ -18,6 +18,7 @@ __all__ = [
     "integrals",
     "kalman_errors",
     "signals",
+    "spread",
     "straight",
     "turns_in_a_row",
     "twice",

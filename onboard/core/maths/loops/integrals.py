@@ -1,6 +1,9 @@
-"""Integrals of a force: once and twice between even nodes, and over the nodes of intervals."""
+"""Integrals of a force: between even nodes, over those of intervals, over those about epochs."""
 
 from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiler import compiled
@@ -65,3 +68,55 @@ def integrals(P: Array, weight: Array, to_end: Array, x: Array, one: Array, two:
                     turned = u * x[k, i, 0, c] + v * x[k, i, 1, c] + w * x[k, i, 2, c]
                     one[k, r, c] += a * turned
                     two[k, r, c] += b * turned
+
+
+@compiled(
+    "void(f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], "
+    "f8[:,:,::1], f8[:,:,::1])"
+)
+def spread(
+    R: Array,
+    R_epoch: Array,
+    first: NDArray[np.int64],
+    velocity: Array,
+    place: Array,
+    x: Array,
+    turned: Array,
+    one: Array,
+    two: Array,
+) -> None:
+    """``R_epoch^T sum velocity R x`` and ``R_epoch^T sum place R x``, into (K, 3, m) that are zero.
+
+    Args:
+        R: (n, 3, 3) body axes of the nodes to those that do not turn.
+        R_epoch: (K, 3, 3) those of the epochs to the same.
+        first: (K,) number of the first node about each epoch; there may be no such.
+        velocity: (K, b) weights of that and the next.
+        place: (K, b).
+        x: (n, 3, m).
+        turned: (n, 3, m), for what is in between.
+        one: written to.
+        two: written to.
+    """
+    n, _, m = x.shape
+    K, b = velocity.shape
+    for i in range(n):
+        for r in range(3):
+            for c in range(m):
+                turned[i, r, c] = (
+                    R[i, r, 0] * x[i, 0, c] + R[i, r, 1] * x[i, 1, c] + R[i, r, 2] * x[i, 2, c]
+                )
+    for k in range(K):
+        for j in range(max(0, -first[k]), min(b, n - first[k])):
+            v, p, i = velocity[k, j], place[k, j], first[k] + j
+            for r in range(3):
+                for c in range(m):
+                    one[k, r, c] += v * turned[i, r, c]
+                    two[k, r, c] += p * turned[i, r, c]
+        for both in (one, two):
+            for c in range(m):
+                x0, x1, x2 = both[k, 0, c], both[k, 1, c], both[k, 2, c]
+                for r in range(3):
+                    both[k, r, c] = (
+                        R_epoch[k, 0, r] * x0 + R_epoch[k, 1, r] * x1 + R_epoch[k, 2, r] * x2
+                    )
