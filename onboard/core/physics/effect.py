@@ -234,13 +234,13 @@ class Effect(Family):
         return len(self.unknowns) > len(self.keys)
 
     def there(self, value: Array, sigma: Array) -> bool:
-        """Whether it has a size: of what is never negative, shapes are shares of it.
+        """Whether it has a size, of either sign: of what is never negative, shapes share it.
 
         Args:
             value: (k,) sizes, without shapes.
             sigma: (k,) theirs.
         """
-        return not (self.positive and self.shaped) or bool(np.any(value > BEYOND * sigma))
+        return not (self.positive and self.shaped) or bool(np.any(np.abs(value) > BEYOND * sigma))
 
     # -- how it is looked for -------------------------------------------------------------------
 

@@ -114,6 +114,7 @@ def test_shapes_without_a_size_are_no_loop():
     assert not made.there(np.array([-5e-5]), sigma)
     assert not made.there(np.array([4e-4]), sigma)
     assert made.there(np.array([5e-4]), sigma)
+    assert made.there(np.array([-5e-4]), sigma), "what is the other way round is said to be"
 
 
 def test_an_axis_with_hysteresis_is_enough_and_a_slope_may_be_none_of_a_curve():
