@@ -141,9 +141,9 @@ class FinalModel:
         absent, with_it = self.fitter.fit(rest, self.held(columns)), self.fitter.fit(among)
         return target.score(self.fitter, absent, with_it)
 
-    def holds(self, name: str) -> bool:
-        """Whether timing or a constant attitude error is no chance beside all other columns."""
-        return self.score(name, self.all) >= least()
+    def holds(self, name: str, among: Sequence[int] | None = None) -> bool:
+        """Whether timing or a constant attitude error is no chance beside others; None: all."""
+        return self.score(name, self.all if among is None else among) >= least()
 
     @staticmethod
     def share(without: Fit, with_it: Fit) -> float:

@@ -12,7 +12,6 @@ from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.hypotheses import Choice, confounders_of
 from onboard.core.diagnosis.nuisance_effects import nuisance_effects, nuisance_kinds, without
 from onboard.core.diagnosis.regimes import main_axis, spans
-from onboard.core.diagnosis.score import least
 from onboard.core.estimate.calibration_model import reversed_of
 from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
@@ -71,7 +70,7 @@ class Findings:
         """
         final = self._final.that_tells(nuisance_kinds()[name])
         among = (final.all, final.with_configured_antenna())
-        return any(final.score(name, columns) >= least() for columns in among)
+        return any(final.holds(name, columns) for columns in among)
 
     def _nuisance_confounders(self, name: str, columns: Sequence[str]) -> tuple[Confounder, ...]:
         """What else could stand for timing or a constant attitude error, by the full sums."""

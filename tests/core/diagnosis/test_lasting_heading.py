@@ -2,13 +2,11 @@
 
 import pytest
 
+from benchmarks.explaining import heard
 from onboard.core.diagnosis.procedure import diagnose
-from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import CalibratorSettings
-from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as fx
 from sitl.builtin.truth import GpsTruth, random_imus
-from sitl.recording import FlightSpec, fly_messages
+from sitl.recording import FlightSpec
 
 OFF = 0.1
 """rad; six degrees: twice what the slow error of a heading may be at any time."""
@@ -23,13 +21,7 @@ def diagnosed(vehicle, seed, *effects):
         gps=GpsTruth(delay=0.04),
         effects=effects,
     )
-    decoder = Decoder(system=1, component=1)
-    made = Calibrator(CalibratorSettings(buffer_s=3600.0, refine=False))
-    for _, message in fly_messages(spec):
-        for sample in decoder.decode(message):
-            made.feed(sample)
-    made.finish()
-    return diagnose(made, 1)
+    return diagnose(heard(spec), 1)
 
 
 @pytest.mark.parametrize(("vehicle", "seed"), [("copter", 41), ("plane", 42)])
