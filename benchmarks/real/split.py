@@ -108,6 +108,7 @@ LOOKS: tuple[str, ...] = (
     "an EKF followed along the flight, its own sensors and antenna unknowns of it, or a loop",
     "what surely improves is a calibration, after 30 s and of hovers too, or as it was",
     "what a receiver states of its accuracy weighs, or a gate at 1.5 m/s",
+    "offsets of two accelerometers surely wander apart, or as likely as not",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (

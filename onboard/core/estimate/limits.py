@@ -189,7 +189,7 @@ CLUSTER_S: Final = 10.0
 WARMING_S: Final = 100.0
 """s; the longest time constant of what two accelerometers drift apart by: a small board's that
 warms up [physics; with none longer than half of a flight, halves of flights for building differ
-by 3.5 times the variance that they say, with 100 s by 0.8, with 300 s by 0.45]."""
+by several times the variance that they say, with 100 s by 0.7, with 300 s by less]."""
 LIKE_SIGMAS: Final = 3.0
 """Sigmas past which two accelerometers differ, a common change is one, or a place is wrong
 [probability]."""

@@ -22,22 +22,31 @@ from onboard.core.estimate.limits import (
 from onboard.core.maths.arrays import Array
 
 SHARES = np.array([0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97])
-"""Of the variance that wanders."""
+"""Of the variance that wanders, those above none each as likely as the next beforehand."""
+NO_OFFSET = 0.5
+"""How likely it is that what varies with the force does not wander: as likely as not, for nothing
+that is known makes a gain another one within a flight [probability]."""
+OFFSET = 1.0 / len(SHARES)
+"""The same of what does not vary with it: no likelier than any other share, for every offset
+follows its sensor's temperature, and a short flight that does not show it is no evidence that it
+does not [physics; with one half, quarters of flights for building differ by 2.1 times the variance
+that they say, with this by 1.4]."""
 CONSTANTS = 10
 """Time constants that are tried, between two windows and the longest [cost: a finer grid moves the
 inflation by less than blocks scatter]."""
 
 
-def inflation(t: Array, scores: Array) -> float:
+def inflation(t: Array, scores: Array, steady: float = NO_OFFSET) -> float:
     """Variance of the mean of scores over that of white noise of the same size, at least 1.
 
     Args:
         t: (n,) when the windows begin, s.
         scores: (n,) whose mean the fit has made zero.
+        steady: how likely it is beforehand that nothing of them wanders.
     """
     if float(np.mean(scores**2)) <= 0.0:
         return 1.0
-    return max(1.0, _clustered(t, scores), _wandering(scores))
+    return max(1.0, _clustered(t, scores), _wandering(scores, steady))
 
 
 def _clustered(t: Array, scores: Array) -> float:
@@ -56,7 +65,7 @@ def _clustered(t: Array, scores: Array) -> float:
     return ratio if beyond else 1.0
 
 
-def _wandering(scores: Array) -> float:
+def _wandering(scores: Array, steady: float) -> float:
     """The same by a process that wanders, averaged over what is likely."""
     n = len(scores)
     periodogram = np.abs(np.fft.rfft(scores - scores.mean())[1:]) ** 2 / n
@@ -69,8 +78,8 @@ def _wandering(scores: Array) -> float:
     S = share * slow[:, None, :] + (1.0 - share)
     level = np.mean(periodogram / S, axis=-1)
     likelihood = -np.sum(np.log(S), axis=-1) - len(turn) * np.log(level)
-    weight = np.exp(likelihood - likelihood.max())
-    weight[:, SHARES == 0.0] *= len(SHARES) - 1.0  # none at all is as likely as any beforehand
+    weight = np.exp(likelihood - likelihood.max()) * np.where(SHARES == 0.0, steady, 1.0 - steady)
+    weight[:, SHARES != 0.0] /= len(SHARES) - 1.0
     # Variance of a mean over n of a unit process, times n.
     mean = (1.0 + keep) / (1.0 - keep) - 2.0 * keep * (1.0 - keep**n) / (n * (1.0 - keep) ** 2)
     found = level * (SHARES * mean + (1.0 - SHARES))

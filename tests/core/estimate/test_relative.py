@@ -7,7 +7,7 @@ import pytest
 
 from onboard.core.estimate.relative import relative_of
 from onboard.core.estimate.shared_windows import shared_windows, window_means
-from onboard.core.estimate.wandering import inflation
+from onboard.core.estimate.wandering import OFFSET, inflation
 from onboard.core.maths.accelerometer import SixParameters
 from tests.core.estimate.two_accelerometers import Motion, batches, wandering
 
@@ -123,3 +123,18 @@ def test_sigmas_are_honest_over_two_hundred_flights(wander):
         assert np.all(spread < 1.4), spread
         # What wanders slowly cannot be told from a gain that is off: wider than need be.
         assert np.all(spread > 0.4), spread
+
+
+def test_what_warms_is_as_far_off_as_it_says_although_a_short_flight_hardly_shows_it():
+    rng, t, left = np.random.default_rng(3), np.arange(20.0), []
+    for _ in range(1000):
+        keep, share = np.exp(-1.0 / rng.uniform(10.0, 100.0)), rng.uniform(0.1, 0.8)
+        slow = [rng.standard_normal()]
+        for step in np.sqrt(1.0 - keep**2) * rng.standard_normal(len(t) - 1):
+            slow.append(keep * slow[-1] + step)
+        offset = np.sqrt(share) * np.array(slow)
+        offset += np.sqrt(1.0 - share) * rng.standard_normal(len(t))
+        seen = offset - offset.mean()
+        variance = inflation(t, seen, OFFSET) * np.mean(seen**2) / len(t)
+        left.append(offset.mean() ** 2 / variance)
+    assert 0.6 < np.mean(left) < 1.4
