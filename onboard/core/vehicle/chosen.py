@@ -38,6 +38,8 @@ class Chosen:
         suspected: effects that explain more than chance and are not taken in all the same, because
             nobody knows their numbers: something is there.
         partly: effects of which gusts hide a part: an unknown of theirs is not testable.
+        together: of the suspected, those of the thrust: the flight determines what they make
+            together, and not one by one.
     """
 
     effects: tuple[str, ...]
@@ -46,6 +48,7 @@ class Chosen:
     untestable: tuple[str, ...]
     suspected: tuple[str, ...] = ()
     partly: tuple[str, ...] = ()
+    together: tuple[str, ...] = ()
 
 
 def choose(choices: Choices) -> Chosen:
@@ -71,7 +74,29 @@ def choose(choices: Choices) -> Chosen:
     suspected = _suspected(choices, chosen, level)
     hidden = () if fit.turned is None else candidates
     partly = tuple(n for n in hidden if any(_untestable(fit, fit.model.indices(n))))
-    return Chosen(effects, gains, rivals, untestable, suspected, partly)
+    together = _together(choices, effects, [n for n in suspected if n in untestable], level)
+    return Chosen(effects, gains, rivals, untestable, suspected, partly, together)
+
+
+def _together(
+    choices: Choices, chosen: Sequence[str], suspected: Sequence[str], level: float
+) -> tuple[str, ...]:
+    """Of effects that nobody knows the numbers of, those of a thrust that surely is not nominal.
+
+    A hover has one thrust for one throttle, which a curve, a battery that gives way or a mass may
+    make: none of the three is known by it, and the thrust is, to a per cent.  So what is asked is
+    how far from nominal all of them are together, with everything free, and whether flight that was
+    not fitted is described better with them.
+    """
+    fit = choices.fit
+    its = tuple(n for n in suspected if fit.model.effect(n).commanded)
+    places = [k for n in its for k in fit.model.indices(n)]
+    if not places:
+        return ()
+    told = choices.told
+    surely = survival(told.apart(places, _off(fit, places, told)), len(places)) < level
+    better = choices.held_out([*chosen, *its]) < choices.held_out(chosen)
+    return its if surely and better else ()
 
 
 def _suspected(choices: Choices, chosen: Sequence[str], level: float) -> tuple[str, ...]:

@@ -86,6 +86,10 @@ def match_copter(
     )
     flight, force_sigma = told.counting(flight), told.sigmas(force_sigma)
     found = _found(flight, frame, force_sigma, Variant(change=_change(told)))
+    nothing_testable = set(found.choices.names) <= set(found.chosen.untestable)
+    if nothing_testable and not found.handed_back:
+        # Numbers that nobody knows are nothing that a flight could be closer with.
+        found = replace(found, held=found.nominal)
     effects = tuple(
         _with_battery(d, found.model.flight, signals, frame) for d in differences(found)
     )
@@ -96,12 +100,13 @@ def match_copter(
         "copter",
         untested,
         effects=effects,
-        frame=_frame(found, signals, frame, effects),
+        frame=_frame(found, signals, frame),
         curves=copter_curves(found, frame, signals),
     )
-    if set(found.choices.names) <= set(found.chosen.untestable):
+    if nothing_testable:
         # What is left of a force that nothing could have explained is no evidence of gusts.
-        note = "; ".join(filter(None, (NOTHING_SHOWN, match.note)))
+        nothing = "" if found.handed_back else NOTHING_SHOWN
+        note = "; ".join(filter(None, (nothing, match.note)))
         match = replace(match, effects=(), shown=False, note=note)
     return told.beside(match)
 
@@ -242,12 +247,10 @@ def _battery(signals: Signals, flight: Flight, frame: CopterAirframe) -> tuple[f
     return None if fit is None else (fit.capacity, fit.resistance)
 
 
-def _frame(
-    m: Matched, signals: Signals, frame: CopterAirframe, effects: tuple[Difference, ...]
-) -> dict[str, float | list[float]]:
+def _frame(m: Matched, signals: Signals, frame: CopterAirframe) -> dict[str, float | list[float]]:
     """Keys of a frame file that flies like the recording: the given frame, and what was found."""
     theta, model = m.fit.theta, m.model
-    names = {d.name for d in effects}
+    names = set(m.handed_back)
     made = frame
     if "thrust_scale" in names:
         ratio = math.exp(float(theta[model.indices("thrust_scale")[0]]))

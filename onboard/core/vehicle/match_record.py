@@ -14,7 +14,7 @@ from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
 from onboard.core.vehicle.bounds import above_sentence, below_sentence
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
-from onboard.core.vehicle.effects.beyond import beyond_of, beyond_sentence, spoilt_by
+from onboard.core.vehicle.effects.beyond import beyond_of, beyond_sentence
 from onboard.core.vehicle.effects.motor_lag import DELAY, MotorLag
 from onboard.core.vehicle.flown_alone import drift_alone
 from onboard.core.vehicle.matching import Matched, left_by
@@ -82,12 +82,11 @@ def differences(m: Matched) -> tuple[Difference, ...]:
     """The effects that were chosen, and turbulence, with their evidence."""
     fit, chosen = m.fit, m.chosen
     whole = sum(max(chosen.gains[n], 0.0) for n in chosen.effects)
-    spoilt = spoilt_by(beyond_of(m.model.effects))
     out = []
     for name in chosen.effects:
-        if name in m.stand_ins or name in spoilt:
+        if name not in m.handed_back:
             continue
-        without = tuple(n for n in chosen.effects if n != name)
+        without = tuple(n for n in (*chosen.effects, *chosen.together) if n != name)
         places = m.model.indices(name)
         effect = m.model.effect(name)
         shown = effect.shown(fit.theta[places].tolist(), fit.sigma[places].tolist())
@@ -172,7 +171,7 @@ def mismatch_of(m: Matched) -> dict[str, AxisMismatch]:
 def drifts_of(m: Matched) -> Alone | None:
     """How velocity drifts when the nominal model, and the found one, fly on alone."""
     before = _drift(m.model, m.model.nominal, m.nominal)
-    after = _drift(m.model, m.fit.theta, m.held)
+    after = _drift(m.model, m.model.nominal if m.held is m.nominal else m.fit.theta, m.held)
     if not len(before):
         return None
     t: Array = m.model.flight.step_s * np.arange(1.0, len(before) + 1.0)
@@ -226,7 +225,7 @@ def note_of(m: Matched) -> str:
     """What a person must know of flight that is not described or was not used; may be empty."""
     said = (
         *dict.fromkeys(m.model.effect(n).note for n in m.chosen.effects),
-        suspected_sentence(m.chosen.suspected),
+        suspected_sentence(m.chosen.suspected, m.chosen.together),
         below_sentence(m.below),
         above_sentence(m.above),
         beyond_sentence(beyond_of(m.model.effects)),
@@ -238,15 +237,19 @@ def note_of(m: Matched) -> str:
     return "; ".join(s for s in said if s)
 
 
-def suspected_sentence(names: tuple[str, ...]) -> str:
+def suspected_sentence(names: tuple[str, ...], together: tuple[str, ...]) -> str:
     """Of effects that explain more than chance and whose numbers are not known."""
     if not names:
         return ""
     its = "its" if len(names) == 1 else "their"
-    return (
+    said = (
         f"{listed(list(names))} would explain a part of what is left, but this flight does not "
         f"determine {its} numbers"
     )
+    if not together:
+        return said
+    are = "is" if len(together) == 1 else "are"
+    return f"{said}; the thrust is known all the same: {listed(list(together))} {are} handed back"
 
 
 def _drift(model: ForceModel, theta: Array, residual: Array) -> Array:

@@ -13,7 +13,7 @@ from onboard.core.vehicle.bounds import above_bounds, at_bounds, below_bounds
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
-from onboard.core.vehicle.effects.beyond import Beyond
+from onboard.core.vehicle.effects.beyond import Beyond, beyond_of, spoilt_by
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.felt import felt_across, felt_by
 from onboard.core.vehicle.fit import Fit, fitted
@@ -41,7 +41,8 @@ class Matched:
         fit: of everything.
         choices: its subsets.
         chosen: the effects.
-        held: (n, k) residual of each step by unknowns of other folds, m/s^2.
+        held: (n, k) residual of each step by unknowns of other folds, m/s^2, with what is handed
+            back.
         nominal: (n, k) residual of the nominal airframe in still air.
         turbulence: of the air.
         remainders: spans that the model does not describe.
@@ -69,6 +70,13 @@ class Matched:
     def stand_ins(self) -> tuple[str, ...]:
         """Effects that stand for something else, and have no name for it."""
         return (*self.below, *self.above)
+
+    @property
+    def handed_back(self) -> tuple[str, ...]:
+        """Effects whose numbers a file of the airframe is to have: named, or known together."""
+        none = {*self.stand_ins, *spoilt_by(beyond_of(self.model.effects))}
+        every = (*self.chosen.effects, *self.chosen.together)
+        return tuple(name for name in every if name not in none)
 
     @property
     def model(self) -> ForceModel:
@@ -102,7 +110,7 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         fit,
         choices,
         chosen,
-        left_by(choices, chosen.effects),
+        left_by(choices, (*chosen.effects, *chosen.together)),
         nominal,
         done.turbulence,
         left,

@@ -25,7 +25,7 @@ from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.plane import plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_curves import plane_curves
-from onboard.core.vehicle.records import Difference, VehicleMatch
+from onboard.core.vehicle.records import VehicleMatch
 from onboard.core.vehicle.structure import structures
 
 LEAST_INDUCED = 0.01
@@ -54,7 +54,7 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         "plane",
         untested,
         effects=effects,
-        frame=_coefficients(found, frame, effects),
+        frame=_coefficients(found, frame),
         curves=plane_curves(found, frame),
     )
     return told.beside(match)
@@ -105,11 +105,9 @@ def _slipping(
     return matched(fit.model, fit)
 
 
-def _coefficients(
-    m: Matched, frame: PlaneAirframe, effects: tuple[Difference, ...]
-) -> dict[str, float | list[float]]:
+def _coefficients(m: Matched, frame: PlaneAirframe) -> dict[str, float | list[float]]:
     """Keys of a coefficient file: those given, and what was found in their places."""
-    names = {d.name for d in effects}
+    names = set(m.handed_back)
     made = frame
     if "lift" in names:
         c_lift_0, c_lift_a = m.fit.theta[m.model.indices("lift")].tolist()

@@ -76,6 +76,32 @@ def test_thrust_by_mass_and_its_curve_are_told_apart():
     assert names(matched(copter_flight(expo=0.2, seed=7))) == {"thrust_curve"}
 
 
+def test_a_hover_hands_back_its_thrust_and_not_what_makes_it():
+    """Mass, curve and battery are nobody's to tell there; what they make of 60 % throttle is."""
+    match = matched(copter_flight(ratio=0.82, seed=31, seconds=120.0, still=True))
+    assert names(match) == set()
+    assert not match.shown
+    frame = CopterAirframe.of({k: v for k, v in match.frame.items() if isinstance(v, float)})
+
+    def thrust(hover, expo, command=0.6):
+        return ((1.0 - expo) * command + expo * command**2) / hover
+
+    found = thrust(frame.hoverThrOut, frame.propExpo)
+    assert found == pytest.approx(0.82 * thrust(0.39, 0.65), rel=2e-3)
+    assert match.mismatch["z"].after < 0.01 * match.mismatch["z"].before
+    assert match.alone_after < 0.05 * match.alone_before
+    assert "the thrust is known" in match.note
+
+
+def test_a_hover_that_shows_nothing_is_no_closer_with_what_nobody_knows():
+    match = matched(copter_flight(seed=32, seconds=120.0, still=True))
+    assert not match.shown
+    assert match.mismatch["z"].after == match.mismatch["z"].before
+    assert CopterAirframe.of(
+        {k: v for k, v in match.frame.items() if isinstance(v, float)}
+    ).hoverThrOut == pytest.approx(0.39)
+
+
 def test_a_battery_that_gives_way_is_seen_in_the_thrust():
     match = matched(copter_flight(volts=(12.6, 9.5), sag=1.0, seed=8))
     assert names(match) == {"voltage_sag"}

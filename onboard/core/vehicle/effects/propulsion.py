@@ -17,6 +17,7 @@ class Propulsion(Effect):
     """Full thrust by mass is ``exp(log_ratio)`` of the simulator's."""
 
     name = "thrust_scale"
+    commanded = True
     manoeuvre = "climb at full throttle, then glide"
 
     def __init__(self, frame: PlaneAirframe) -> None:

@@ -16,6 +16,7 @@ class ThrustCurve(Effect):
     """``(1 - expo) c + expo c^2`` of full thrust at command c, mean over the motors."""
 
     name = "thrust_curve"
+    commanded = True
     manoeuvre = "climb and descend at full and at low throttle, for ten seconds each"
 
     def __init__(self, frame: CopterAirframe) -> None:

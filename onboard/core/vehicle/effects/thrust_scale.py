@@ -17,6 +17,7 @@ class ThrustScale(Effect):
     """Full thrust by mass is ``exp(log_ratio)`` of the frame's."""
 
     name = "thrust_scale"
+    commanded = True
     manoeuvre = "hover and climb, with the motor outputs in the log"
 
     def __init__(self, frame: CopterAirframe) -> None:

@@ -27,6 +27,7 @@ class VoltageSag(Effect):
     """
 
     name = "voltage_sag"
+    commanded = True
     manoeuvre = "fly from a full battery to the warning, with full throttle now and then"
 
     def __init__(self, full_voltage: float) -> None:
