@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.half_space import least_above
@@ -18,7 +19,6 @@ from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
 from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
-    BLOCK_S,
     FEWEST_BLOCKS,
     LEAST_SHARE,
     MORE_ROUNDS,
@@ -62,7 +62,7 @@ class Fit:
     residual: Array
     jacobian: Columns
     sensitivity: Array
-    block: Array
+    block: NDArray[np.int64]
     doubt: Array
     turned: Turned | None = None
 
@@ -171,7 +171,7 @@ def summed(
     slopes = slopes_at(model, theta) if slopes is None else slopes
     jacobian, level = slopes.by, slopes.level
     windows = windows_of(model.flight)
-    of_row = np.floor((model.flight.t[windows.first] - model.flight.t[0]) / BLOCK_S)
+    of_row = model.flight.blocks_of(model.flight.t[windows.first])
     # A step is of the block that its row is counted in, wherever the next one begins.
     block = np.repeat(of_row, windows.counts)
     left = whitened_residual(model, residual, noise, sensitivity)

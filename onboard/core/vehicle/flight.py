@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.atmosphere import density
-from onboard.core.vehicle.limits import CONTACT_M_S2, STEP_S
+from onboard.core.vehicle.limits import BLOCK_S, CONTACT_M_S2, FEWEST_BLOCKS, STEP_S
 from onboard.core.vehicle.signals import COVERED, Signals, Stream
 from onboard.core.vehicle.spans import inside
 from onboard.core.vehicle.trajectory import Motion
@@ -22,6 +22,9 @@ _BY_STEP = (
     "place",
 )
 """Fields that have a value for each step."""
+ROUNDING = 1e-6
+"""Of a block: a recording that begins where one does is of that block, however numbers are rounded
+[cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +115,18 @@ class Flight:
     def parts(self) -> int:
         """How many recordings it is of."""
         return int(self.part[-1]) + 1
+
+    def blocks_of(self, t: Array) -> NDArray[np.int64]:
+        """Numbers of the blocks whose sums are kept at times (k,) of the flight, s.
+
+        Blocks of a short flight are a whole part of the usual ones, so that recordings still begin
+        where a block does: with one block there is no flight that a fit has not seen, and with a
+        few nothing tells how much they scatter.
+        """
+        shorter = math.ceil(FEWEST_BLOCKS * BLOCK_S / (len(self) * self.step_s))
+        at = (t - self.t[0]) * max(shorter, 1) / BLOCK_S
+        out: NDArray[np.int64] = np.floor(at + ROUNDING).astype(np.int64)
+        return out
 
     @property
     def since_start(self) -> Array:

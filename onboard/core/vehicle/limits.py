@@ -101,7 +101,8 @@ WINDOW_STEPS: Final = 5
 """Steps whose mean is a row of the fit: half a second, in which an error of the velocity hardly
 changes, so that what follows is nearly a Markov process [physics]."""
 BLOCK_S: Final = 12.0
-"""Length of a block whose sums are kept, s: longer than the disturbance remembers [cost]."""
+"""Length of a block whose sums are kept, s: longer than the disturbance remembers.  It is a whole
+part of that in a flight that has not the fewest of them [cost]."""
 FEWEST_BLOCKS: Final = 5
 """Fewer blocks do not tell the scatter between them [probability]."""
 FEWEST_FLIGHTS: Final = 5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.physics.finding import Where
@@ -32,7 +33,7 @@ def regime_of(flight: Flight, mine: Mask) -> str:
 
 
 def places_of(
-    flight: Flight, made: Array, axes: tuple[int, ...], block: Array
+    flight: Flight, made: Array, axes: tuple[int, ...], block: NDArray[np.int64]
 ) -> tuple[Where, ...]:
     """Blocks in which an effect moves the force most, neighbours joined.
 

@@ -18,7 +18,6 @@ from onboard.core.maths.chi_square import survival
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import (
-    BLOCK_S,
     FALSE_ALARM,
     MARGIN_S,
     OUTLYING,
@@ -66,7 +65,7 @@ def remainders(whole: ForceModel, fit: Fit) -> tuple[Remainder, ...]:
     sensitivity = windows.mean(whole.sensitivity(fit.theta))
     unclear = windows.mean(whole.unclear(fit.theta))
     t, part = flight.since_start[windows.first], flight.part[windows.first]
-    block = np.floor((flight.t[windows.first] - flight.t[0]) / BLOCK_S).astype(int)
+    block = flight.blocks_of(flight.t[windows.first])
     numbers = np.unique(block)
     flying = ~near_ground(flight)[windows.first]
     residual = residual * flying[:, None]

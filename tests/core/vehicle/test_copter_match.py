@@ -10,6 +10,7 @@ from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter_match import match_copter
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.flight import History
+from onboard.core.vehicle.several import joined
 from onboard.core.vehicle.signals import Signals
 from tests.core.vehicle.flights import STEP, copter_flight
 
@@ -100,6 +101,27 @@ def test_a_hover_that_shows_nothing_is_no_closer_with_what_nobody_knows():
     assert CopterAirframe.of(
         {k: v for k, v in match.frame.items() if isinstance(v, float)}
     ).hoverThrOut == pytest.approx(0.39)
+
+
+@pytest.mark.parametrize("seconds", [11.0, 25.0, 50.0])
+def test_a_short_flight_is_not_clean_by_having_no_flight_to_be_proven_on(seconds):
+    match = matched(copter_flight(ratio=0.6, seed=33, seconds=seconds))
+    assert not match.explained or names(match)
+    assert match.mismatch["z"].after < 0.1 * match.mismatch["z"].before
+    for difference in match.effects:
+        if difference.level == "vehicle" and difference.name != "turbulence":
+            assert difference.held_out_after < difference.held_out_before
+
+
+def test_recordings_of_one_match_share_no_block_however_short_they_are():
+    flights = [copter_flight(seed=k, seconds=s) for k, s in ((1, 11.0), (2, 13.0), (3, 17.3))]
+    whole = joined(flights)
+    block = whole.blocks_of(whole.t)
+    assert len(np.unique(block)) >= 5
+    for k in range(2):
+        assert block[whole.part == k].max() < block[whole.part == k + 1].min()
+    alone = copter_flight(seconds=240.0)
+    assert len(np.unique(alone.blocks_of(alone.t))) == 20
 
 
 def test_a_battery_that_gives_way_is_seen_in_the_thrust():
