@@ -177,6 +177,6 @@ def test_an_attitude_that_is_turned_all_flight_long_is_turned_back():
     true = rotation_from_euler(0.3 * np.sin(T), 0.2 * np.cos(T), 0.1 * T)
     turn = rotation_from_vector(np.array([[0.0, 0.0, heading]]))
     recorded = turn @ true @ rotation_from_vector(tilt[None])
-    sensors = Sensors(SCALE, OFFSET, np.zeros(3), tilt=attitude_error(engine))
+    sensors = Sensors(SCALE, OFFSET, np.zeros(3), tilt=attitude_error(engine)[0])
     np.testing.assert_allclose(sensors.attitude(recorded), true, atol=0.005)
     assert np.abs(recorded - true).max() > 0.05

@@ -327,3 +327,26 @@ def test_several_flights_keep_their_commands_apart():
     together = Air(joined(flights))
     model.act(together, [0.2])
     assert together.commands == pytest.approx(np.concatenate(alone), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [41, 42, 43])
+def test_on_a_straight_and_even_flight_a_heading_that_is_off_is_no_wind_that_is_sure(seed):
+    """Two degrees at 24 m/s are 0.9 m/s across: by sideslip they were told to 0.04 m/s."""
+    still = {"turning": 0.0, "speeds": 0.0}
+    flight = plane_flight(seed=seed, seconds=40.0, turned=0.04, reading=1.0, **still)
+    match = matched(replace(flight, attitude_sigma=np.array([1e-3, 1e-3, 0.05])))
+    across = match.numbers["wind.east"]
+    assert abs(across.real) < 3.0 * across.sigma
+    assert abs(across.real) < 0.5
+
+
+def test_turns_tell_the_wind_from_a_heading_that_is_off():
+    known = np.array([1e-3, 1e-3, 0.05])
+    flight = plane_flight(seed=44, wind=(2.0, -3.0), turned=0.04, reading=1.0)
+    match = matched(replace(flight, attitude_sigma=known))
+    for key, truth in (("north", 2.0), ("east", -3.0)):
+        number = match.numbers[f"wind.{key}"]
+        assert abs(number.real - truth) < 4.0 * number.sigma
+        assert number.sigma < 0.15
+    off = match.numbers["turned_down"]
+    assert abs(abs(off.real) - 0.04) < 4.0 * off.sigma
