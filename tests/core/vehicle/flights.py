@@ -174,9 +174,9 @@ def plane_flight(
     plane along, so that it flies through them as through still air, m/s.  The rudder moves at
     random, and by the sideslip that it holds; or it is kicked this far to either side, and the
     plane slips as it does; ``angles`` is the standard deviation of the angle of attack.  Servos
-    and motor follow behind a low-pass, s.  Standard deviations of the rate of turn and of the speed are
-    ``turning``, rad/s, and ``speeds``, m/s; the recorded heading is ``turned`` too far all flight
-    long, rad.
+    and motor follow behind a low-pass, s.  Standard deviations of the rate of turn and of the
+    speed are ``turning``, rad/s, and ``speeds``, m/s; the recorded heading is ``turned`` too far
+    all flight long, rad.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
