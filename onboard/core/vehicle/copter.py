@@ -11,7 +11,6 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.effects.air_density import AirDensity
-from onboard.core.vehicle.effects.attitude_error import AttitudeError
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.beyond_rotors import COPTERS
 from onboard.core.vehicle.effects.body_drag import BodyDrag
@@ -205,7 +204,6 @@ def copter_model(
         *([AirDensity()] if flown_high(flight) else []),
         *([MassChange(change, flight)] if change else []),
         *([own([RotorWind(variant.through) for _ in parts])] if variant.through else []),
-        own([AttitudeError(flight.attitude_sigma, s) for s in np.atleast_2d(force_sigma)]),
         VerticalDrag(frame),
         ThrustTilt(),
         RotorDrag(frame, by_components=variant.by_components),

@@ -18,8 +18,9 @@ LEAST_RAD = 1e-5
 class AttitudeError(ByStep):
     """A constant rotation about north, east and down, as far from none as is left open.
 
-    On a straight flight a heading that is off by a degree is the wind across of a sixtieth of the
-    speed, and a pitch that is off is lift: what tells them apart is turning alone.
+    On a straight flight of a plane a heading that is off by a degree is the wind across of a
+    sixtieth of the speed, and a pitch that is off is lift: what tells them apart is turning alone.
+    A copter's rotors drag by a hundredth of what wings lift.
     """
 
     def __init__(self, sigma: Array, force_sigma: Array) -> None:
