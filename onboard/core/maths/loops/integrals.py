@@ -23,27 +23,69 @@ def twice(step: float, a: Array, v: Array, x: Array) -> None:
             )
 
 
-@compiled("void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1])")
-def gained(
+@compiled("void(f8, f8, f8[:,::1], f8[:,::1])")
+def late(kept: float, share: float, a: Array, z: Array) -> None:
+    """A force (n, 3) behind a first-order lag, from what is in the first row of ``z`` (n, 3) on."""
+    for i in range(len(a) - 1):
+        for c in range(3):
+            z[i + 1, c] = kept * z[i, c] + (share - kept) * a[i, c] + (1.0 - share) * a[i + 1, c]
+
+
+@compiled(
+    "void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8, f8[::1], f8[:,::1], i8[::1], "
+    "f8[:,:,::1])"
+)
+def seen(
     start: float,
     step: float,
     a: Array,
     v: Array,
     x: Array,
+    z: Array,
+    lag: float,
     t: Array,
-    velocity: Array,
-    place: Array,
+    terms: Array,
+    ends: NDArray[np.int64],
+    out: Array,
 ) -> None:
-    """Integrals of :func:`twice` at times ``t`` (k,), into two (k, 3)."""
-    last = len(a) - 2
-    for k in range(len(t)):
-        at = t[k] - start
-        i = min(max(int(at / step), 0), last)
-        s = at - i * step
-        for c in range(3):
-            slope = (a[i + 1, c] - a[i, c]) / step
-            velocity[k, c] = v[i, c] + s * (a[i, c] + 0.5 * s * slope)
-            place[k, c] = x[i, c] + s * (v[i, c] + s * (0.5 * a[i, c] + s / 6.0 * slope))
+    """Sums of velocity and place of :func:`twice` and of the force of :func:`late` about times.
+
+    Args:
+        start: time of the first node, s.
+        step: s.
+        a: (n, 3) force.
+        v: (n, 3).
+        x: (n, 3).
+        z: (n, 3) force behind a lag.
+        lag: s; 0: no term asks for it.
+        t: (k,) s.
+        terms: (T, 4) shift of the time, weights of velocity, place and lagged force.
+        ends: (S,) number behind the last term of each sum.
+        out: (S, k, 3) zero; written to.
+    """
+    last, j, per_s = len(a) - 2, 0, 1.0 / step
+    for one in range(len(ends)):
+        while j < ends[one]:
+            shift, of_v, of_x, of_z = terms[j, 0], terms[j, 1], terms[j, 2], terms[j, 3]
+            for k in range(len(t)):
+                at = t[k] + shift - start
+                i = min(max(int(at / step), 0), last)
+                s = at - i * step
+                half, sixth = 0.5 * s, s * per_s / 6.0
+                # Of v + s (a + s / 2 slope), x + s (v + s (a / 2 + s / 6 slope)), and the lag's.
+                for c in range(3):
+                    now, rise = a[i, c], a[i + 1, c] - a[i, c]
+                    y = of_v * (v[i, c] + s * (now + half * per_s * rise))
+                    if of_x != 0.0:
+                        y += of_x * (x[i, c] + s * (v[i, c] + s * (0.5 * now + sixth * rise)))
+                    out[one, k, c] += y
+                if of_z != 0.0:
+                    kept = np.exp(-s / lag)
+                    for c in range(3):
+                        slope = per_s * (a[i + 1, c] - a[i, c])
+                        behind = kept * z[i, c] + (1.0 - kept) * (a[i, c] - lag * slope)
+                        out[one, k, c] += of_z * (behind + slope * s)
+            j += 1
 
 
 @compiled("void(f8[:,:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[:,:,::1], f8[:,:,::1])")
