@@ -46,12 +46,17 @@ class Past:
     epoch: Array
     R: Array
 
-    def changes(self, before: Array) -> Array:
-        """(n, K, 3) by how much it was larger ``before`` (n,) s, body axes of the epochs, m/s."""
-        t = self.epoch - before[:, None]
-        then = self.gained.velocity(t.ravel()).reshape(*t.shape, 3)
-        more = then - self.gained.velocity(self.epoch)
-        out: Array = (more[..., None, :] @ self.R)[..., 0, :]
+    def changes(self, before: Array, weights: Array) -> Array:
+        """(K, 3, u) sums of by how much it was larger before, body axes of the epochs, m/s.
+
+        Args:
+            before: (n,) s.
+            weights: (u, n).
+        """
+        t, K = (self.epoch - before[:, None]).ravel(), len(self.epoch)
+        then = (weights @ self.gained.velocity(t).reshape(len(before), -1)).reshape(-1, K, 3)
+        more = then - weights.sum(axis=1)[:, None, None] * self.gained.velocity(self.epoch)
+        out: Array = np.swapaxes(self.R, -1, -2) @ np.moveaxis(more, 0, -1)
         return out
 
 
@@ -190,7 +195,7 @@ class _Followed:
         since = t[0] + at * step - epoch[:, None]
         return Spread(
             self._maker.signals(t),
-            self._R[::each],
+            np.ascontiguousarray(self._R[::each]),
             R_epoch,
             at,
             velocity_weights(since, step, window, apart, shares),

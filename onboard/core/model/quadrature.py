@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,18 +85,74 @@ class Intervals:
         Returns:
             Two arrays (K, 3, m) in the body axes of each interval's start.
         """
+        K, _, _, m = x_b.shape
+        one, two = np.empty((K, 3, m)), np.empty((K, 3, m))
+        self.integrate(x_b, one, two)
+        return one, two
+
+    def integrate(self, x_b: Array, one: Array, two: Array) -> None:
+        """Write :meth:`integrals` into two arrays (K, 3, m), of any layout."""
         loops = compiled_loops()
         K, nodes, _, m = x_b.shape
         if loops is not None:
-            one, two = np.zeros((K, 3, m)), np.zeros((K, 3, m))
-            weights = plain(self.weight), plain(self.weight_to_end)
-            loops.integrals(plain(self.P), *weights, plain(x_b), one, two)
-            return one, two
+            loops.integrals(self.P, self.weight, self.weight_to_end, plain(x_b), one, two)
+            return
         # Nodes and axes as one dimension that is summed over: what is turned is never stored.
         both_weights = np.stack((self.weight, self.weight_to_end), axis=1)
         turn = both_weights[:, :, None, :, None] * self.P.transpose(0, 2, 1, 3)[:, None]
         both: Array = turn.reshape(K, 6, 3 * nodes) @ x_b.reshape(K, 3 * nodes, m)
-        return both[:, :3], both[:, 3:]
+        one[:], two[:] = both[:, :3], both[:, 3:]
+
+    def of_sensors(self) -> OfSensors:
+        """Integrals of what is in every model, at once."""
+        loops = compiled_loops()
+        s, K = self.signals, len(self.duration)
+        if loops is not None:
+            out = np.zeros((K, 2, 3, loops.OWN))
+            weights = self.weight, self.weight_to_end
+            loops.own(self.P, *weights, s.w_b, s.raw_s, s.f_b, plain(s.R_bs), out)
+            return OfSensors(out, s.R_bs)
+        axes, turned = np.broadcast_to(np.eye(3), self.P.shape), cross(s.w_b, s.f_b)
+        raw, rate = s.R_bs * s.raw_s[..., None, :], np.eye(3) * s.w_b[..., None, :]
+        x = [s.f_b[..., None], axes, raw, turned[..., None], rate]
+        return OfSensors(np.stack(self.integrals(np.concatenate(x, axis=-1)), axis=1), s.R_bs)
+
+
+class OfSensors(NamedTuple):
+    """What :meth:`Intervals.integrals` makes of signals that every model has regressors of.
+
+    Attributes:
+        both: (K, 2, 3, 11) once and twice integrated, body axes of each interval's start.
+        R_bs: (3, 3) board orientation.
+    """
+
+    both: Array
+    R_bs: Array
+
+    @property
+    def force(self) -> Array:
+        """(K, 2, 3) of the specific force."""
+        return self.both[..., 0]
+
+    @property
+    def axes(self) -> Array:
+        """(K, 2, 3, 3) of the body's axes: ``P`` itself."""
+        return self.both[..., 1:4]
+
+    @property
+    def raw(self) -> Array:
+        """(K, 2, 3, 3) of ``R_bs e_j raw_j``, the raw force by the sensor's axes."""
+        return self.both[..., 4:7]
+
+    @property
+    def turned(self) -> Array:
+        """(K, 2, 3, 1) of ``w x f``."""
+        return self.both[..., 7:8]
+
+    @property
+    def rate(self) -> Array:
+        """(K, 2, 3, 3) of ``e_j w_j``, the rate by axes."""
+        return self.both[..., 8:]
 
 
 def gregory_weights(count: int) -> Array:

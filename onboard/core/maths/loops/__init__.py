@@ -6,12 +6,13 @@ held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
 """
 
 from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
-from onboard.core.maths.loops.integrals import integrals, late, seen, spread, twice
+from onboard.core.maths.loops.integrals import OWN, integrals, late, own, seen, spread, twice
 from onboard.core.maths.loops.kalman import kalman_errors
 from onboard.core.maths.loops.nodes import followed, inside, turned_on
 from onboard.core.maths.loops.turns import attitudes
 
 __all__ = [
+    "OWN",
     "attitudes",
     "cubics",
     "dragged",
@@ -20,6 +21,7 @@ __all__ = [
     "integrals",
     "kalman_errors",
     "late",
+    "own",
     "seen",
     "signals",
     "spread",
