@@ -42,6 +42,7 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged
+from onboard.core.maths.medians import middle
 from onboard.core.model import ekf3
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
@@ -314,8 +315,8 @@ class Engine:
         Of fixes further apart than is looked around them, shares of what is an epoch apart stand
         for something else.
         """
-        steps = [float(np.median(np.diff(b.fixes.t))) for b in self.batches if len(b.fixes) > 1]
-        return bool(steps) and float(np.median(steps)) <= AROUND_SPAN_S
+        steps = [middle(np.diff(b.fixes.t)) for b in self.batches if len(b.fixes) > 1]
+        return bool(steps) and middle(np.array(steps)) <= AROUND_SPAN_S
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         self.aged = shifted(self.aged, self.shift(self.point, point))

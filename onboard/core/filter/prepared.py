@@ -156,8 +156,8 @@ def _epochs(
     ned[:, H, 0] = fixes.height - known_height
     ned[:, V, 1:], ned[:, H, 1:], ned[:, PSI, 1:] = there[:, 0:3], -there[:, 5], there[:, 6:9]
     noise = np.zeros((n, MEASURED))
-    rate = np.linalg.norm(nodes.now.w_b, axis=1)
-    noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
+    rate2 = (nodes.now.w_b**2).sum(axis=1)
+    noise[:, PSI] = STAMP_JITTER_S**2 * rate2[:, None]
     moving = np.zeros((n, MEASURED))
     gained = (R_att @ nodes.f_mean[:, :, None])[..., 0]
     gained[:, 2] += STANDARD_GRAVITY

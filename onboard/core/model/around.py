@@ -218,6 +218,6 @@ class _Followed:
             return self.attitude(now.t), lever_velocity(now.w_b)
         half = min(window / 2.0, AROUND_SPAN_S)
         all_ = self.attitude(np.concatenate([now.t, now.t + half, now.t - half]))
-        R, after, before = np.split(all_, 3)
+        R, after, before = all_.reshape(3, -1, 3, 3)
         out: Array = np.swapaxes(R, -1, -2) @ (after - before) / (2.0 * half)
         return R, out

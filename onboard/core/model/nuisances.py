@@ -155,7 +155,9 @@ class LeverArmError(Family):
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""
-        return Direct(body=np.broadcast_to(np.eye(3), (len(around.now.t), 3, 3)))
+        body = np.zeros((len(around.now.t), 3, 3))
+        body[:] = np.eye(3)
+        return Direct(body=body)
 
 
 class ImuDelay(Family):

@@ -291,7 +291,7 @@ class Model:
         m, K, epochs = self.size, len(intervals.duration), len(around.now.t)
         gained, body = np.zeros((K, 9, m + 1)), np.zeros((epochs, 9, m + 1))
         ned, along = np.zeros((epochs, 9, m)), np.zeros((epochs, m))
-        of, acting = intervals.of_sensors(), [np.zeros(0, dtype=np.int64)]
+        of, acting = intervals.of_sensors(), np.zeros(m, dtype=np.bool_)
         for family in self.families:
             if not family.available(around.now):
                 continue
@@ -311,10 +311,10 @@ class Model:
                     body[:, first : first + 3, columns] += d.body
                 if d.ned is not None:
                     ned[:, first : first + 3, s] = d.ned
-                    acting.append(np.arange(s.start, s.stop))
+                    acting[s] = True
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
-        return SegmentRegressors(gained, body, ned, along, of, np.unique(np.concatenate(acting)))
+        return SegmentRegressors(gained, body, ned, along, of, np.flatnonzero(acting))
 
 
 def _accelerated(family: Family, intervals: Intervals, of: OfSensors, out: Array) -> None:

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.medians import middle
 from onboard.core.model.linearisation import SHAPES
 from onboard.core.model.smoothing import (
     RESOLVED_S,
@@ -64,7 +65,7 @@ class Response:
             reach: to either side of an epoch in which the velocity is known, s.
         """
         step = velocity.step
-        self.apart = min(float(np.median(np.diff(t))), reach) if len(t) > 1 else 0.0
+        self.apart = min(middle(np.diff(t)), reach) if len(t) > 1 else 0.0
         shapes = _less_even(window, self.apart, step)
         shaped = _shared(shares, shapes)
         force = mean(window, step) + change(shaped, LATER_S)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 import numpy as np
@@ -174,8 +175,8 @@ class Gained:
             window: s, whose :func:`lag_of` the force is behind where a lag is in them.
         """
         out = np.zeros((len(of), len(t), 3))
-        ends = np.cumsum([len(one) for one in of])
-        terms = np.array([term for one in of for term in one]).reshape(-1, 4)
+        ends = np.array(list(accumulate(map(len, of))))
+        terms = np.array(list(chain.from_iterable(chain.from_iterable(of)))).reshape(-1, 4)
         lag = lag_of(window) if terms[:, 3].any() else 0.0
         late = self._lagged_force(lag) if lag > 0.0 else self._a
         loops = compiled_loops()
