@@ -18,7 +18,7 @@ import numpy as np
 
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.estimate.dead_reckoning import KnownIntervals
-from onboard.core.estimate.going_through import PassObserver, through
+from onboard.core.estimate.going_through import through
 from onboard.core.estimate.limits import (
     MOST_AGED,
     MOST_IDLE,
@@ -50,7 +50,13 @@ from onboard.core.model.regressors import Family, Model
 
 
 class Engine:
-    """Sums and solution of one accelerometer."""
+    """Sums and solution of one accelerometer.
+
+    Attributes:
+        traced: whether passes whose sums count keep their epochs, for :meth:`take`.
+    """
+
+    traced = False
 
     def __init__(
         self,
@@ -60,7 +66,6 @@ class Engine:
         noise: NoiseLevels | None = None,
         uses: Uses | None = None,
         more: tuple[Family, ...] = (),
-        observer: PassObserver | None = None,
     ) -> None:
         """Take the settings and where to start.
 
@@ -71,10 +76,8 @@ class Engine:
             noise: first noise levels.
             uses: measurements that the filter uses.
             more: physics besides the calibration's own.
-            observer: is told of every pass whose sums count.
         """
         self._more = more
-        self._observer = observer
         self.settings = settings
         self.prior = prior
         self.point = point or Linearisation()
@@ -117,12 +120,17 @@ class Engine:
         return calibration_model(self.point, self.prior, self.settings.needs, self._more)
 
     def _counting_pass(self) -> Pass:
-        """A pass whose sums will count: the observer sees it from its beginning."""
+        """A pass whose sums will count."""
         made = self._new_pass()
-        if self._observer is not None:
-            made.keep_traces = True
-            self._observer.begin()
+        made.keep_traces = self.traced
+        self.begin()
         return made
+
+    def begin(self) -> None:
+        """A pass whose sums will count begins: what was seen of the one before is void."""
+
+    def take(self, result: PassResult) -> None:
+        """A batch has gone through it."""
 
     def _new_pass(
         self,
@@ -210,8 +218,7 @@ class Engine:
 
     def _run(self, batch: Batch) -> None:
         result = through(self._pass, batch, self.settings.coast_s)
-        if self._observer is not None:
-            self._observer.take(result)
+        self.take(result)
         self.blocks.append(result.block)
         self.refused.update(result.refused)
         if result.states:

@@ -311,7 +311,7 @@ class Model:
                     body[:, first : first + 3, columns] += d.body
                 if d.ned is not None:
                     ned[:, first : first + 3, s] = d.ned
-                    acting[s] = True
+                    acting[s] |= d.ned.any(axis=(0, 1))
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
         return SegmentRegressors(gained, body, ned, along, of, np.flatnonzero(acting))
