@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -106,10 +106,19 @@ class Segment:
     _told: dict[object, object] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, of: Callable[[Segment], Told]) -> Told:
-        """What a function says of the samples, worked out once: every pass asks again."""
+        """What a function says of the samples, worked out once: every pass asks again.
+
+        Of the samples only, not of slow signals: :meth:`with_slow`.
+        """
         if of not in self._told:
             self._told[of] = of(self)
         return cast("Told", self._told[of])
+
+    def with_slow(self, slow: dict[str, Signal]) -> Segment:
+        """The same samples with other slow signals; what is told of either's is of both."""
+        made = replace(self, slow=slow)
+        object.__setattr__(made, "_told", self._told)
+        return made
 
     def interpolant(self) -> Hermite:
         """Interpolant of (rate, raw) stacked to (n, 6)."""

@@ -19,7 +19,7 @@ The prediction is that of what the autopilot *recorded*; unknowns are errors of 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -284,7 +284,7 @@ class Model:
             for f in self.families
             if (signal := f.remembers(segment, before.get(f.name))) is not None
         }
-        return replace(segment, slow=segment.slow | remembered) if remembered else segment
+        return segment.with_slow(segment.slow | remembered) if remembered else segment
 
     def regressors(self, intervals: Intervals, around: Around) -> SegmentRegressors:
         """Evaluate every family on one segment."""

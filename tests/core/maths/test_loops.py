@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from onboard.core.filter.noise_step import bounded
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
@@ -123,3 +124,13 @@ def test_what_is_dragged_is_the_same(seed, n):
     load, start = np.cumsum(rng.normal(size=n)), rng.normal(size=len(PLAYS))
     one, other = both_ways(lambda: _dragged(load, start))
     np.testing.assert_array_equal(other, one)
+
+
+@given(SEEDS, st.integers(1, 20))
+@settings(max_examples=30, deadline=None)
+def test_a_maximum_between_bounds_is_the_same(seed, n):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    H, slope = root @ root.T + 0.5 * np.eye(n), rng.normal(size=n)
+    one, other = both_ways(lambda: bounded(H, slope, np.full(n, -0.3), np.full(n, 0.2)))
+    np.testing.assert_allclose(other, one, atol=1e-9)

@@ -5,6 +5,7 @@ Equal to numpy's way to rounding (no fast-math): :class:`~onboard.core.maths.int
 held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
 """
 
+from onboard.core.maths.loops.bounded import bounded
 from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
 from onboard.core.maths.loops.integrals import OWN, integrals, late, own, seen, spread, twice
 from onboard.core.maths.loops.kalman import kalman_errors
@@ -14,6 +15,7 @@ from onboard.core.maths.loops.turns import attitudes
 __all__ = [
     "OWN",
     "attitudes",
+    "bounded",
     "cubics",
     "dragged",
     "followed",
