@@ -74,9 +74,9 @@ def test_attitude_between_samples_is_the_same(seed, turn, delay):
     np.testing.assert_allclose(other @ np.swapaxes(other, 1, 2), np.eye(3) + 0 * one, atol=1e-12)
 
 
-@given(SEEDS)
+@given(SEEDS, st.sampled_from([None, (0.1, 0.2, -0.1, 0.3)]))
 @settings(max_examples=20, deadline=None)
-def test_nodes_and_integrals_are_the_same(seed):
+def test_nodes_and_integrals_are_the_same(seed, shares):
     rng = np.random.default_rng(seed)
     flown = segment(rng)
     six = np.array([1.01, 0.99, 1.02, 0.1, -0.2, 0.3])
@@ -86,10 +86,11 @@ def test_nodes_and_integrals_are_the_same(seed):
     def made():
         maker = NodeMaker(flown, np.array([0.01, -0.02, 0.03]), six)
         inside = maker.intervals(start[:-1], start[1:])
-        near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]))
+        shaped = None if shares is None else np.array(shares)
+        near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]), shaped)
         force = inside.signals.f_b[..., None] * x
         signals = (inside.signals.w_b, inside.signals.raw_s, inside.signals.slow("signal"))
-        seen = (near.f_mean, near.averaged, near.slope, near.shapes)
+        seen = (near.f_mean, near.averaged, near.averaged_place, near.slope, near.shapes)
         of = inside.of_sensors().both
         return (inside.P, of, *inside.integrals(force), *signals, *seen, near.R, near.swing)
 
