@@ -18,7 +18,7 @@ import numpy as np
 
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.estimate.dead_reckoning import KnownIntervals
-from onboard.core.estimate.going_through import through
+from onboard.core.estimate.going_through import Watched, through
 from onboard.core.estimate.limits import (
     MOST_AGED,
     MOST_IDLE,
@@ -49,14 +49,8 @@ from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
 
 
-class Engine:
-    """Sums and solution of one accelerometer.
-
-    Attributes:
-        traced: whether passes whose sums count keep their epochs, for :meth:`take`.
-    """
-
-    traced = False
+class Engine(Watched):
+    """Sums and solution of one accelerometer."""
 
     def __init__(
         self,
@@ -125,12 +119,6 @@ class Engine:
         made.keep_traces = self.traced
         self.begin()
         return made
-
-    def begin(self) -> None:
-        """A pass whose sums will count begins: what was seen of the one before is void."""
-
-    def take(self, result: PassResult) -> None:
-        """A batch has gone through it."""
 
     def _new_pass(
         self,

@@ -1,10 +1,26 @@
-"""Batches of flight through a pass."""
+"""Batches of flight through a pass, and what is seen of it."""
 
 from __future__ import annotations
 
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import PassResult
 from onboard.core.inputs.segments import Batch
+
+
+class Watched:
+    """What sees its own passes whose sums count, if it has something to do with their epochs.
+
+    Attributes:
+        traced: whether these passes keep their epochs.
+    """
+
+    traced = False
+
+    def begin(self) -> None:
+        """A pass begins: what was seen of the one before is void."""
+
+    def take(self, result: PassResult) -> None:
+        """A batch has gone through it."""
 
 
 def through(made: Pass, batch: Batch, coast_s: float) -> PassResult:
