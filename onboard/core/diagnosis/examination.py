@@ -66,6 +66,7 @@ class Examination(Engine):
         point = replace(point or origin.point, skew_from=t0)
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
+        self.traced = traced
         self.traces = Traces()
         self._refused: Refused | None = None
         super().__init__(
@@ -75,7 +76,6 @@ class Examination(Engine):
             origin.noise,
             uses=Uses(refused=refused),
             more=(*families, *self.carried),
-            observer=self if traced else None,
         )
         self._refused_by: Engine | None = like
         self.batches = list(like.batches if batches is None else batches)
@@ -137,13 +137,16 @@ class Examination(Engine):
 
     def begin(self) -> None:
         """A pass begins: its epochs are kept, those of the one before are not."""
+        if not self.traced:
+            return
         room = sum(len(batch.fixes) for batch in self.batches)
         self.traces, self._refused = Traces(room, self.model.size), None
         self._refused_by = None
 
     def take(self, result: PassResult) -> None:
         """Keep the epochs of a batch that has gone through."""
-        self.traces.extend(result.traces)
+        if self.traced:
+            self.traces.extend(result.traces)
 
     def with_rows(self, theta: Array | None = None, covariance: Array | None = None) -> Examination:
         """Go through the whole flight, keep every row; again if timing was off or gates were blind.

@@ -18,7 +18,7 @@ import numpy as np
 
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.estimate.dead_reckoning import KnownIntervals
-from onboard.core.estimate.going_through import PassObserver, through
+from onboard.core.estimate.going_through import Watched, through
 from onboard.core.estimate.limits import (
     MOST_AGED,
     MOST_IDLE,
@@ -42,13 +42,14 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged
+from onboard.core.maths.medians import middle
 from onboard.core.model import ekf3
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
 
 
-class Engine:
+class Engine(Watched):
     """Sums and solution of one accelerometer."""
 
     def __init__(
@@ -59,7 +60,6 @@ class Engine:
         noise: NoiseLevels | None = None,
         uses: Uses | None = None,
         more: tuple[Family, ...] = (),
-        observer: PassObserver | None = None,
     ) -> None:
         """Take the settings and where to start.
 
@@ -70,10 +70,8 @@ class Engine:
             noise: first noise levels.
             uses: measurements that the filter uses.
             more: physics besides the calibration's own.
-            observer: is told of every pass whose sums count.
         """
         self._more = more
-        self._observer = observer
         self.settings = settings
         self.prior = prior
         self.point = point or Linearisation()
@@ -116,11 +114,10 @@ class Engine:
         return calibration_model(self.point, self.prior, self.settings.needs, self._more)
 
     def _counting_pass(self) -> Pass:
-        """A pass whose sums will count: the observer sees it from its beginning."""
+        """A pass whose sums will count."""
         made = self._new_pass()
-        if self._observer is not None:
-            made.keep_traces = True
-            self._observer.begin()
+        made.keep_traces = self.traced
+        self.begin()
         return made
 
     def _new_pass(
@@ -209,8 +206,7 @@ class Engine:
 
     def _run(self, batch: Batch) -> None:
         result = through(self._pass, batch, self.settings.coast_s)
-        if self._observer is not None:
-            self._observer.take(result)
+        self.take(result)
         self.blocks.append(result.block)
         self.refused.update(result.refused)
         if result.states:
@@ -314,8 +310,8 @@ class Engine:
         Of fixes further apart than is looked around them, shares of what is an epoch apart stand
         for something else.
         """
-        steps = [float(np.median(np.diff(b.fixes.t))) for b in self.batches if len(b.fixes) > 1]
-        return bool(steps) and float(np.median(steps)) <= AROUND_SPAN_S
+        steps = [middle(np.diff(b.fixes.t)) for b in self.batches if len(b.fixes) > 1]
+        return bool(steps) and middle(np.array(steps)) <= AROUND_SPAN_S
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         self.aged = shifted(self.aged, self.shift(self.point, point))

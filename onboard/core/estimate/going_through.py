@@ -1,16 +1,20 @@
-"""Batches of flight through a pass, and who is told of it."""
+"""Batches of flight through a pass, and what is seen of it."""
 
 from __future__ import annotations
-
-from typing import Protocol
 
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import PassResult
 from onboard.core.inputs.segments import Batch
 
 
-class PassObserver(Protocol):
-    """Told of every pass whose sums count; an engine that has one keeps the traces of epochs."""
+class Watched:
+    """What sees its own passes whose sums count, if it has something to do with their epochs.
+
+    Attributes:
+        traced: whether these passes keep their epochs.
+    """
+
+    traced = False
 
     def begin(self) -> None:
         """A pass begins: what was seen of the one before is void."""

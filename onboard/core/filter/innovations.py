@@ -73,11 +73,8 @@ def steps(
     duration: Array,
     turn: Array,
     force: Array,
-    force_to_end: Array,
     mean_turn: Array,
-    columns: Array,
-    columns_to_end: Array,
-    columns_turn: Array,
+    stack: Array,
     missed: Array,
     stated: Array,
 ) -> Steps:
@@ -86,25 +83,19 @@ def steps(
     Args:
         duration: (K,) T, s.
         turn: (K, 3, 3) ``P`` at the end.
-        force: (K, 3) ``integral P f dtau``, m/s.
-        force_to_end: (K, 3) ``integral (T - tau) P f dtau``, m.
+        force: (K, 2, 3) ``integral P f dtau``, m/s, and ``integral (T - tau) P f dtau``, m.
         mean_turn: (K, 3, 3) ``integral P dtau``, s.
-        columns: (K, 3, m) as ``force``, per unit of each of the m unknowns.
-        columns_to_end: (K, 3, m) as ``force_to_end``.
-        columns_turn: (K, 3, m) the turn that they add, rad per unit.
+        stack: (K, 9, m + 1) both of these per unit of each of the m unknowns, and the turn that
+            they add, rad per unit, behind a column of zeros: becomes the columns of the steps.
         missed: (K, 6) as in :class:`Step`.
         stated: (K,) see there.
     """
-    K, _, m = columns.shape
     # What turns at a steady rate meets the force on the mean in proportion to its time left.
-    arm = skew(force - force_to_end / duration[:, None])
-    moved = np.concatenate(
-        [force[:, :, None], force_to_end[:, :, None], mean_turn, arm @ mean_turn], axis=2
-    )
-    stack = np.zeros((K, 9, m + 1))
-    stack[:, 0:3, 1:] = arm @ columns_turn - columns
-    stack[:, 3:6, 1:] = columns_to_end
-    stack[:, 6:9, 1:] = -columns_turn
+    arm = skew(force[:, 0] - force[:, 1] / duration[:, None])
+    moved = np.concatenate([force.swapaxes(1, 2), mean_turn, arm @ mean_turn], axis=2)
+    gained, turned = stack[:, 0:3], stack[:, 6:9]
+    np.subtract(arm @ turned, gained, out=gained)
+    np.negative(turned, out=turned)
     return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed, stated)
 
 

@@ -22,6 +22,7 @@ import numpy as np
 from onboard.core.filter.limits import LIMITS, LONGEST_STEP, USUAL_SIGMA
 from onboard.core.filter.noise import ESTIMATED, NO_VARIANCES, USUAL, NoiseLevels, nudges
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.compiling import compiled_loops, plain
 
 SWEEPS = 200
 """Sweeps over the levels that a bounded step takes at the most: it is within a thousandth of a
@@ -103,6 +104,10 @@ def bounded(H: Array, slope: Array, low: Array, high: Array) -> Array:
     semidefinite with a positive diagonal.
     """
     x = np.zeros(len(slope))
+    loops = compiled_loops()
+    if loops is not None:
+        loops.bounded(plain(H), plain(slope), plain(low), plain(high), SWEEPS, CLOSE, x)
+        return x
     for _ in range(SWEEPS):
         before = x.copy()
         for i in range(len(x)):

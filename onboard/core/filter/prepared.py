@@ -122,16 +122,13 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_], NDArray[
 def _steps(
     intervals: Intervals, regressors: SegmentRegressors, missed: Array, stated: Array
 ) -> Steps:
-    force, force_to_end = intervals.integrals(intervals.signals.f_b[..., None])
+    of = regressors.of_sensors
     return steps(
         intervals.duration,
         intervals.P[:, -1],
-        force[:, :, 0],
-        force_to_end[:, :, 0],
-        np.einsum("ki,kiab->kab", intervals.weight, intervals.P),
-        regressors.force1,
-        regressors.force2,
-        regressors.turn,
+        of.force,
+        of.axes[:, 0],
+        regressors.gained,
         missed,
         stated,
     )
@@ -151,21 +148,16 @@ def _epochs(
     lower = np.einsum("ka,ka->k", R_att[:, 2], nodes.averaged_place)
     lower += STANDARD_GRAVITY * point.window**2 / 24.0
     known_height = -lower - R_att[:, 2] @ segment.lever_arm_b
-    n, _, m = c.velocity_body.shape
-    body, ned = np.zeros((n, 9, m + 1)), np.zeros((n, MEASURED, m + 1))
+    n, body = len(known), c.body
     body[:, 0:3, 0] = -known
-    body[:, 0:3, 1:] = c.velocity_body
-    body[:, 3:6, 1:] = -c.position_body  # height is up
-    body[:, 6:9, 1:] = c.attitude_body
+    np.negative(body[:, 3:6], out=body[:, 3:6])  # height is up
+    ned, there = np.zeros((n, MEASURED, len(c.acting) + 1)), c.ned.take(c.acting, axis=2)
     ned[:, V, 0] = fixes.v_n
     ned[:, H, 0] = fixes.height - known_height
-    ned[:, V, 1:] = c.velocity_ned
-    ned[:, H, 1:] = -c.position_ned[:, 2]
-    ned[:, PSI, 1:] = c.attitude_ned
-    acting = np.flatnonzero(ned.any(axis=(0, 1)))
+    ned[:, V, 1:], ned[:, H, 1:], ned[:, PSI, 1:] = there[:, 0:3], -there[:, 5], there[:, 6:9]
     noise = np.zeros((n, MEASURED))
-    rate = np.linalg.norm(nodes.now.w_b, axis=1)
-    noise[:, PSI] = (STAMP_JITTER_S * rate[:, None]) ** 2
+    rate2 = (nodes.now.w_b**2).sum(axis=1)
+    noise[:, PSI] = STAMP_JITTER_S**2 * rate2[:, None]
     moving = np.zeros((n, MEASURED))
     gained = (R_att @ nodes.f_mean[:, :, None])[..., 0]
     gained[:, 2] += STANDARD_GRAVITY
@@ -178,8 +170,8 @@ def _epochs(
         R_att,
         near,
         body,
-        np.ascontiguousarray(ned[:, :, acting]),
-        acting,
+        ned,
+        np.concatenate([[0], c.acting + 1]),
         c.along_velocity,
         trusted,
         noise,

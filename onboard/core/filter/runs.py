@@ -15,7 +15,7 @@ from onboard.core.filter.limits import LEAST_VELOCITY_VAR
 from onboard.core.filter.loops import measured, take, take_noise, whiten
 from onboard.core.filter.motion import angle_of, carry, mean, turn_by
 from onboard.core.filter.readings import Index
-from onboard.core.filter.state import STATES
+from onboard.core.filter.state import MEASURED, STATES
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiler import compiled, part
 
@@ -89,9 +89,11 @@ def _sum(
 
 
 @part
-def _keep(W: Array, E: Array, var: Array, at: int, rows: Array, raw: Array, log_var: Array) -> None:
-    """Write down the innovations of an epoch from row ``at`` on."""
-    r, m1 = E.shape
+def _keep(
+    W: Array, E: Array, var: Array, r: int, at: int, rows: Array, raw: Array, log_var: Array
+) -> None:
+    """Write down the r innovations of an epoch from row ``at`` on."""
+    m1 = E.shape[1]
     for b in range(len(W)):
         for a in range(r):
             log_var[b, at + a] = var[b, a]
@@ -227,6 +229,8 @@ def run(
     members, _, width = carried.shape
     m1 = columns.shape[2]
     turned, stop = np.zeros(3), progress[2] + most
+    E, W = np.empty((MEASURED, m1)), np.empty((members, MEASURED, width))
+    whitener, var = np.zeros((MEASURED, MEASURED)), np.empty((members, MEASURED))
     while progress[0] < len(duration) and progress[2] < stop:
         k = progress[0]
         e = ends[k]
@@ -261,8 +265,7 @@ def run(
             angle_of(R_attitude[e], R_nb, turned)
         z = _spread(ned[e], acting, m1)
         measured(R_nb, body[e], along[e], mean(carried, 2, theta), turned, z)
-        E, W, whitener = np.empty((r, m1)), np.empty((members, r, width)), np.zeros((r, r))
-        var = np.empty((members, r))
+        W[:, r:] = 0.0
         reads = _sum(white, noise[e], jitter, moving[e], powers, stated[e])
         if whiten(carried, z, number, reads, E, W, whitener, var):
             return 1
@@ -275,7 +278,7 @@ def run(
         if progress[3] % symmetry == 0:
             _symmetric(carried, m1)
         at, n = progress[1], progress[2]
-        _keep(W, E, var, at, rows, raw, log_var)
+        _keep(W, E, var, r, at, rows, raw, log_var)
         taken[n] = e
         _note(carried, R_nb, E, offered[e, 0], theta, states[n])
         progress[0], progress[1], progress[2] = k + 1, at + r, n + 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -106,10 +106,19 @@ class Segment:
     _told: dict[object, object] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, of: Callable[[Segment], Told]) -> Told:
-        """What a function says of the samples, worked out once: every pass asks again."""
+        """What a function says of the samples, worked out once: every pass asks again.
+
+        Of the samples only, not of slow signals: :meth:`with_slow`.
+        """
         if of not in self._told:
             self._told[of] = of(self)
         return cast("Told", self._told[of])
+
+    def with_slow(self, slow: dict[str, Signal]) -> Segment:
+        """The same samples with other slow signals; what is told of either's is of both."""
+        made = replace(self, slow=slow)
+        object.__setattr__(made, "_told", self._told)
+        return made
 
     def interpolant(self) -> Hermite:
         """Interpolant of (rate, raw) stacked to (n, 6)."""
@@ -119,7 +128,7 @@ class Segment:
         t_k = self.t_attitude
         if len(t_k) < 2:
             return interpolate_rotation(at, t_k, self.R_attitude[:])
-        at = np.clip(at, t_k[0], t_k[-1])
+        at = np.minimum(np.maximum(at, t_k[0]), t_k[-1])
         # Few of the samples are next to a time that is asked for.
         k, asked = self._before(at), np.zeros(len(t_k), dtype=bool)
         asked[k] = asked[k + 1] = True
@@ -156,7 +165,8 @@ class Segment:
     def _before(self, at: Array) -> NDArray[np.intp]:
         """(m,) the attitude sample before each of the times ``at`` (m,) that has one after it."""
         t_k = self.t_attitude
-        return np.clip(np.searchsorted(t_k, at, side="right") - 1, 0, len(t_k) - 2)
+        k = t_k.searchsorted(at, side="right") - 1
+        return np.minimum(np.maximum(k, 0), len(t_k) - 2)
 
     def slow_at(self, name: str, at: Array) -> Array | None:
         """A slow signal at times ``at`` by straight lines; None if the recording lacks it."""
@@ -188,9 +198,11 @@ class Segment:
             delay: by how much that clock is ahead of the gyroscope's, s.
         """
         R = self._between_samples(at, delay)
-        i = np.clip(np.searchsorted(self.t_attitude, at) - 1, 0, max(len(self.t_attitude) - 2, 0))
         if len(self.t_attitude) < 2:
             return R, np.zeros(len(at), dtype=bool)
+        i = np.minimum(
+            np.maximum(self.t_attitude.searchsorted(at) - 1, 0), len(self.t_attitude) - 2
+        )
         t0, t1 = self.t_attitude[i], self.t_attitude[i + 1]
         near = (t1 - t0 < DENSE_S) | (np.minimum(at - t0, t1 - at) < NEAR_S)
         return R, near & (at >= t0) & (at <= t1)

@@ -24,11 +24,9 @@ def rotation_from_euler(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Ar
     Returns:
         (..., 3, 3) ``R_nb``.
     """
-    r, p, y = np.broadcast_arrays(
-        np.asarray(roll, dtype=np.float64),
-        np.asarray(pitch, dtype=np.float64),
-        np.asarray(yaw, dtype=np.float64),
-    )
+    r, p, y = (np.asarray(angle, dtype=np.float64) for angle in (roll, pitch, yaw))
+    if not r.shape == p.shape == y.shape:
+        r, p, y = np.broadcast_arrays(r, p, y)
     sr, cr, sp, cp, sy, cy = np.sin(r), np.cos(r), np.sin(p), np.cos(p), np.sin(y), np.cos(y)
     R = np.empty((*r.shape, 3, 3))
     R[..., 0, 0] = cy * cp

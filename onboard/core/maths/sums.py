@@ -165,7 +165,7 @@ class BankSums:
         """Empty sums of ``members`` filters with ``m`` unknowns."""
         self._gram = np.zeros((members, m + 1, m + 1))
         """Products of ``y`` (first) and ``h`` with themselves and each other."""
-        self._pending = np.empty((members, _TOGETHER, m + 1))
+        self._pending = np.empty((members, 0, m + 1))
         self._waiting = 0
         self.log_det = np.zeros(members)
         self.rows = 0
@@ -211,6 +211,9 @@ class BankSums:
 
     def _collect(self, y: Array, h: Array) -> None:
         """At most :data:`_TOGETHER` rows."""
+        if not self._pending.shape[1]:  # most sums are given many rows at once, or other sums
+            members, _, m1 = self._pending.shape
+            self._pending = np.empty((members, _TOGETHER, m1))
         start, end = self._waiting, self._waiting + y.shape[1]
         if end > _TOGETHER:
             self._added()

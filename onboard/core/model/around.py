@@ -11,16 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.frames import rotation_from_vector, skew
+from onboard.core.maths.frames import skew
 from onboard.core.model.linearisation import SHAPES
-from onboard.core.model.quadrature import (
-    NODES_PER_SAMPLE,
-    NodeMaker,
-    Signals,
-    turns_in_a_row,
-)
+from onboard.core.model.quadrature import NODES_PER_SAMPLE, NodeMaker, Signals
 from onboard.core.model.response import Response
-from onboard.core.model.smoothing import Gained
+from onboard.core.model.smoothing import Gained, averaged
 from onboard.core.model.spread import (
     Spread,
     nodes_within,
@@ -51,12 +46,17 @@ class Past:
     epoch: Array
     R: Array
 
-    def changes(self, before: Array) -> Array:
-        """(n, K, 3) by how much it was larger ``before`` (n,) s, body axes of the epochs, m/s."""
-        t = self.epoch - before[:, None]
-        then = self.gained.velocity(t.ravel()).reshape(*t.shape, 3)
-        more = then - self.gained.velocity(self.epoch)
-        out: Array = (more[..., None, :] @ self.R)[..., 0, :]
+    def changes(self, before: Array, weights: Array) -> Array:
+        """(K, 3, u) sums of by how much it was larger before, body axes of the epochs, m/s.
+
+        Args:
+            before: (n,) s.
+            weights: (u, n).
+        """
+        t, K = (self.epoch - before[:, None]).ravel(), len(self.epoch)
+        then = (weights @ self.gained.velocity(t).reshape(len(before), -1)).reshape(-1, K, 3)
+        more = then - weights.sum(axis=1)[:, None, None] * self.gained.velocity(self.epoch)
+        out: Array = np.swapaxes(self.R, -1, -2) @ np.moveaxis(more, 0, -1)
         return out
 
 
@@ -108,10 +108,9 @@ def around(
         antenna: (3,) lever arm beyond the segment's own, body axes, m; None: none.
         shares: (4,) of other shapes than an even mean; None: none.
     """
-    followed = _Followed(maker, float(epoch[0]), float(epoch[-1]))
     lever = maker.segment.lever_arm_b + (0.0 if antenna is None else antenna)
-    force = followed.gained(followed.force)
-    there = followed.gained(followed.force + followed.swung(lever))
+    followed = _Followed(maker, float(epoch[0]), float(epoch[-1]), lever)
+    force, there = followed.force, followed.there
     now = maker.signals(epoch)
     R, swing = followed.swing(now, window)
 
@@ -122,14 +121,17 @@ def around(
 
     shares = np.zeros(len(SHAPES)) if shares is None else shares
     response = Response(there, epoch, window, shares, AROUND_SPAN_S)
+    even = force.seen(epoch, [averaged(window, force.step)])[0]
+    made = (even + response.shaped, response.place, response.force, response.slope)
+    seen, place, f_mean, slope, *shapes = own(np.concatenate([np.stack(made), response.shapes]))
     return Around(
         now,
         R,
-        own(force.averaged(epoch, window) + response.shaped),
-        own(there.averaged_place(epoch, window)),
-        own(response.force()),
-        own(response.slope()),
-        np.moveaxis(own(response.shapes), 0, -1),
+        seen,
+        place,
+        f_mean,
+        slope,
+        np.stack(shapes, axis=-1),
         swing,
         Past(there, epoch, R),
         followed.spread(epoch, R, window, response.apart, shares) if window > 0.0 else None,
@@ -148,43 +150,31 @@ def lever_velocity(w_b: Array) -> Array:
 class _Followed:
     """Attitude and force of a segment at even nodes, in the axes of the first."""
 
-    def __init__(self, maker: NodeMaker, first: float, last: float) -> None:
-        """Follow them from before the epoch ``first`` until after ``last``, s."""
+    def __init__(self, maker: NodeMaker, first: float, last: float, lever: Array) -> None:
+        """Follow them from before the epoch ``first`` until after ``last``, s.
+
+        Args:
+            maker: of the nodes.
+            first: s.
+            last: s.
+            lever: (3,) to another place whose force is followed, too, body axes, m.
+        """
         self._maker = maker
         # Twice as many as between epochs, for those lie anywhere between these.
         pairs = max(FEWEST_PAIRS, int(np.ceil(NODES_PER_SAMPLE * maker.rate * AROUND_SPAN_S)))
         self._step = AROUND_SPAN_S / (2 * pairs)
         self._start = first - AROUND_SPAN_S - self._step
-        count = int(np.ceil((last + AROUND_SPAN_S - self._start) / self._step)) + 1
-        t = np.linspace(self._start, self._start + count * self._step, 2 * count + 1)
-        fine, self._t = maker.signals(t), t[::2]
-        if maker.recorded:
-            self._R = maker.recorded_attitude(self._t)
-        else:
-            self._R = turns_in_a_row(fine.w_b[None], np.full(1, self._step))[0]
-        self.force = (self._R @ fine.f_b[::2, :, None])[..., 0]
-
-    def gained(self, a: Array) -> Gained:
-        """Integrals of an acceleration (n, 3) at the nodes."""
-        return Gained(self._start, self._step, a)
-
-    def swung(self, lever: Array) -> Array:
-        """(n, 3) acceleration of the end of a lever arm (3,), body axes, m: second differences."""
-        place = (self._R.reshape(-1, 3) @ lever).reshape(-1, 3)
-        out = np.empty_like(place)
-        out[1:-1] = (place[2:] - 2.0 * place[1:-1] + place[:-2]) / self._step**2
-        out[0], out[-1] = out[1], out[-2]
-        return out
+        self._count = int(np.ceil((last + AROUND_SPAN_S - self._start) / self._step)) + 2
+        nodes = maker.followed(self._start, self._step, self._count, lever)
+        self._R, force, there = nodes
+        self.force = Gained(self._start, self._step, force)
+        """Of the accelerometer."""
+        self.there = Gained(self._start, self._step, there)
+        """Of the other place."""
 
     def attitude(self, t: Array) -> Array:
-        """(k, 3, 3) at times ``t`` (k,): of the node before, turned at the rate half-way."""
-        if self._maker.recorded:
-            return self._maker.recorded_attitude(t)
-        i = ((t - self._start) / self._step).astype(int)
-        node = self._start + i * self._step
-        w = self._maker.signals(0.5 * (t + node)).w_b
-        out: Array = self._R[i] @ rotation_from_vector(w * (t - node)[:, None])
-        return out
+        """(k, 3, 3) at times ``t`` (k,)."""
+        return self._maker.turned_on(self._start, self._step, self._R, t)
 
     def spread(
         self, epoch: Array, R_epoch: Array, window: float, apart: float, shares: Array
@@ -199,12 +189,13 @@ class _Followed:
             shares: (4,) of other shapes than an even mean.
         """
         each = max(1, int(AROUND_SPAN_S / FEWEST_PAIRS / self._step))
-        t, step = self._t[::each], each * self._step
+        step = each * self._step
+        t: Array = self._start + step * np.arange(-(-self._count // each), dtype=np.float64)
         at = nodes_within(reaches(window, apart, shares), (epoch - t[0]) / step, step)
         since = t[0] + at * step - epoch[:, None]
         return Spread(
             self._maker.signals(t),
-            self._R[::each],
+            np.ascontiguousarray(self._R[::each]),
             R_epoch,
             at,
             velocity_weights(since, step, window, apart, shares),
@@ -227,6 +218,6 @@ class _Followed:
             return self.attitude(now.t), lever_velocity(now.w_b)
         half = min(window / 2.0, AROUND_SPAN_S)
         all_ = self.attitude(np.concatenate([now.t, now.t + half, now.t - half]))
-        R, after, before = np.split(all_, 3)
+        R, after, before = all_.reshape(3, -1, 3, 3)
         out: Array = np.swapaxes(R, -1, -2) @ (after - before) / (2.0 * half)
         return R, out

@@ -86,7 +86,7 @@ def _flew_on(before: Batch, after: Batch) -> bool:
 
 
 def _with(batch: Batch, slow: dict[str, Signal]) -> Batch:
-    return replace(batch, segment=replace(batch.segment, slow=slow))
+    return replace(batch, segment=batch.segment.with_slow(slow))
 
 
 def followed(segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal]:

@@ -8,7 +8,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.model import ekf3, ekf3_filter
 from onboard.core.model.around import Around
 from onboard.core.model.nuisances import AXIS
-from onboard.core.model.quadrature import Signals
+from onboard.core.model.quadrature import OfSensors, Signals
 from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
 
 
@@ -30,6 +30,10 @@ class GyroScale(Family):
     def rate(self, nodes: Signals) -> Array:
         """``-e_j w_j``: the unknown is what the gyroscope reads too much."""
         return -np.eye(3) * nodes.w_b[..., None, :]
+
+    def turned(self, of: OfSensors) -> Array:
+        """Of :meth:`rate`."""
+        return -of.rate[:, 0]
 
     def attitude(self, around: Around) -> Direct:
         """What an EKF makes of it, if the recorded attitude follows this gyroscope."""

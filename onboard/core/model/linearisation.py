@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,9 +91,15 @@ class Linearisation:
     def attitude(self, segment: Segment, t: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""
         R, near = segment.attitude_at(t + self.attitude_delay, self.attitude_delay)
-        return rotation_from_euler(0.0, 0.0, -self.heading) @ R, near
+        return _turned(-self.heading) @ R, near
 
     @property
     def six(self) -> Array:
         """(6,) scale, beta."""
         return np.array(self.scale + self.beta)
+
+
+@lru_cache(maxsize=4)
+def _turned(heading: float) -> Array:
+    """(3, 3) turn about down: all segments about one linearisation have the same."""
+    return rotation_from_euler(0.0, 0.0, heading)

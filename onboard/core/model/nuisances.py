@@ -9,7 +9,7 @@ from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import cross
 from onboard.core.model.around import Around
 from onboard.core.model.linearisation import SHAPES
-from onboard.core.model.quadrature import Signals
+from onboard.core.model.quadrature import Intervals, OfSensors, Signals
 from onboard.core.model.regressors import Direct, Family, Unknown
 
 AXIS = "xyz"
@@ -51,6 +51,10 @@ class Six(Family):
         out[..., :3] = nodes.R_bs * nodes.raw_s[..., None, :]
         out[..., 3:] = nodes.R_bs
         return out
+
+    def gained(self, intervals: Intervals, of: OfSensors) -> Array:  # noqa: ARG002
+        """Of :meth:`acceleration`."""
+        return np.concatenate([of.raw, of.axes @ of.R_bs], axis=-1)
 
 
 class GpsLatency(Family):
@@ -151,7 +155,9 @@ class LeverArmError(Family):
 
     def position(self, around: Around) -> Direct:
         """``R e_i``."""
-        return Direct(body=np.broadcast_to(np.eye(3), (len(around.now.t), 3, 3)))
+        body = np.zeros((len(around.now.t), 3, 3))
+        body[:] = np.eye(3)
+        return Direct(body=body)
 
 
 class ImuDelay(Family):
@@ -182,6 +188,10 @@ class GyroTiming(Family):
     def acceleration(self, nodes: Signals) -> Array:
         """``R(t + d) f = R f + R (w x f) d``: a late gyroscope gives an attitude of the past."""
         return cross(nodes.w_b, nodes.f_b)[..., None]
+
+    def gained(self, intervals: Intervals, of: OfSensors) -> Array:  # noqa: ARG002
+        """Of :meth:`acceleration`."""
+        return of.turned
 
 
 class AttitudeOffset(Family):

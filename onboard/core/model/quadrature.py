@@ -9,7 +9,8 @@ NED when the filter, going through the epochs, knows ``R_nb(start)``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,18 +85,74 @@ class Intervals:
         Returns:
             Two arrays (K, 3, m) in the body axes of each interval's start.
         """
+        K, _, _, m = x_b.shape
+        one, two = np.empty((K, 3, m)), np.empty((K, 3, m))
+        self.integrate(x_b, one, two)
+        return one, two
+
+    def integrate(self, x_b: Array, one: Array, two: Array) -> None:
+        """Write :meth:`integrals` into two arrays (K, 3, m), of any layout."""
         loops = compiled_loops()
         K, nodes, _, m = x_b.shape
         if loops is not None:
-            one, two = np.zeros((K, 3, m)), np.zeros((K, 3, m))
-            weights = plain(self.weight), plain(self.weight_to_end)
-            loops.integrals(plain(self.P), *weights, plain(x_b), one, two)
-            return one, two
+            loops.integrals(self.P, self.weight, self.weight_to_end, plain(x_b), one, two)
+            return
         # Nodes and axes as one dimension that is summed over: what is turned is never stored.
         both_weights = np.stack((self.weight, self.weight_to_end), axis=1)
         turn = both_weights[:, :, None, :, None] * self.P.transpose(0, 2, 1, 3)[:, None]
         both: Array = turn.reshape(K, 6, 3 * nodes) @ x_b.reshape(K, 3 * nodes, m)
-        return both[:, :3], both[:, 3:]
+        one[:], two[:] = both[:, :3], both[:, 3:]
+
+    def of_sensors(self) -> OfSensors:
+        """Integrals of what is in every model, at once."""
+        loops = compiled_loops()
+        s, K = self.signals, len(self.duration)
+        if loops is not None:
+            out = np.zeros((K, 2, 3, loops.OWN))
+            weights = self.weight, self.weight_to_end
+            loops.own(self.P, *weights, s.w_b, s.raw_s, s.f_b, plain(s.R_bs), out)
+            return OfSensors(out, s.R_bs)
+        axes, turned = np.broadcast_to(np.eye(3), self.P.shape), cross(s.w_b, s.f_b)
+        raw, rate = s.R_bs * s.raw_s[..., None, :], np.eye(3) * s.w_b[..., None, :]
+        x = [s.f_b[..., None], axes, raw, turned[..., None], rate]
+        return OfSensors(np.stack(self.integrals(np.concatenate(x, axis=-1)), axis=1), s.R_bs)
+
+
+class OfSensors(NamedTuple):
+    """What :meth:`Intervals.integrals` makes of signals that every model has regressors of.
+
+    Attributes:
+        both: (K, 2, 3, 11) once and twice integrated, body axes of each interval's start.
+        R_bs: (3, 3) board orientation.
+    """
+
+    both: Array
+    R_bs: Array
+
+    @property
+    def force(self) -> Array:
+        """(K, 2, 3) of the specific force."""
+        return self.both[..., 0]
+
+    @property
+    def axes(self) -> Array:
+        """(K, 2, 3, 3) of the body's axes: ``P`` itself."""
+        return self.both[..., 1:4]
+
+    @property
+    def raw(self) -> Array:
+        """(K, 2, 3, 3) of ``R_bs e_j raw_j``, the raw force by the sensor's axes."""
+        return self.both[..., 4:7]
+
+    @property
+    def turned(self) -> Array:
+        """(K, 2, 3, 1) of ``w x f``."""
+        return self.both[..., 7:8]
+
+    @property
+    def rate(self) -> Array:
+        """(K, 2, 3, 3) of ``e_j w_j``, the rate by axes."""
+        return self.both[..., 8:]
 
 
 def gregory_weights(count: int) -> Array:
@@ -141,11 +198,6 @@ def turns_in_a_row(w_b: Array, h: Array) -> Array:
     Returns:
         (K, M + 1, 3, 3) body axes at the node to those at the first.
     """
-    loops = compiled_loops()
-    if loops is not None:
-        P = np.empty((len(h), w_b.shape[1] // 2 + 1, 3, 3))
-        loops.turns_in_a_row(plain(w_b), plain(h), P)
-        return P
     return _chain(rotation_from_vector(rotation_increments(w_b, h)))
 
 
@@ -187,19 +239,22 @@ class NodeMaker:
         self._six = six
         self.recorded = recorded_attitude
         self._at = segment.interpolant()
+        self._felt = plain(bias_b), plain(six), plain(segment.R_bs)
         self.rate = float((len(segment.t) - 1) / (segment.t[-1] - segment.t[0]))
+
+    @property
+    def _samples(self) -> tuple[Array, Array]:
+        """What compiled loops interpolate: times of the samples and cubics between them."""
+        return self._at.t, self._at.cubics
 
     def signals(self, t: Array) -> Signals:
         """Signals at times ``t`` of any shape."""
         loops = compiled_loops()
         if loops is not None:
-            w, raw, f_b = (np.empty((t.size, 3)) for _ in range(3))
-            made = plain(self._bias), plain(self._six), plain(self.segment.R_bs)
-            loops.signals(self._at.t, self._at.cubics, plain(t).ravel(), *made, w, raw, f_b)
-            shape = (*t.shape, 3)
-            return Signals(
-                t, w.reshape(shape), raw.reshape(shape), f_b.reshape(shape), self.segment
-            )
+            w, raw, f_b = np.empty((3, *t.shape, 3))
+            flat = w.reshape(-1, 3), raw.reshape(-1, 3), f_b.reshape(-1, 3)
+            loops.signals(*self._samples, plain(t).ravel(), *self._felt, *flat)
+            return Signals(t, w, raw, f_b, self.segment)
         x = self._at(t)
         raw = x[..., 3:]
         f_b = (raw * self._six[:3] + self._six[3:]) @ self.segment.R_bs.T
@@ -210,18 +265,85 @@ class NodeMaker:
         T = end - start
         density = NODES_PER_SAMPLE * self.rate
         M = max(4, int(np.ceil(density * float(T.max()))))
-        share = np.arange(2 * M + 1) / (2.0 * M)
-        fine = self.signals(start[:, None] + T[:, None] * share)
-        t = fine.t[:, ::2]
-        if self.recorded:
-            R = self.recorded_attitude(t)
-            P = np.swapaxes(R[:, :1], -1, -2) @ R
-        else:
-            P = turns_in_a_row(fine.w_b, T / M)
-        coarse = Signals(t, fine.w_b[:, ::2], fine.raw_s[:, ::2], fine.f_b[:, ::2], self.segment, P)
+        share = np.arange(M + 1) / M
+        t = start[:, None] + T[:, None] * share
+        signals, P = self._inside(t, T / M)
         weight = gregory_weights(M) * T[:, None]
-        to_end = weight * (1.0 - share[::2]) * T[:, None]
-        return Intervals(coarse, P, T, weight, to_end)
+        to_end = weight * (1.0 - share) * T[:, None]
+        return Intervals(signals, P, T, weight, to_end)
+
+    def _inside(self, t: Array, step: Array) -> tuple[Signals, Array]:
+        """Signals at nodes in a row ``t`` (K, M + 1), a ``step`` (K,) apart, s, and their ``P``."""
+        loops = compiled_loops()
+        if self.recorded:
+            R, nodes = self.recorded_attitude(t), self.signals(t)
+            P: Array = np.swapaxes(R[:, :1], -1, -2) @ R
+            return replace(nodes, P=P), P
+        if loops is not None:
+            (w, raw, f_b), P = np.empty((3, *t.shape, 3)), np.empty((*t.shape, 3, 3))
+            loops.inside(*self._samples, t, step, *self._felt, w, raw, f_b, P)
+            return Signals(t, w, raw, f_b, self.segment, P), P
+        nodes = self.signals(t)
+        between = self.signals(t[:, :-1] + 0.5 * step[:, None])
+        rates = np.empty((len(t), 2 * t.shape[1] - 1, 3))
+        rates[:, ::2], rates[:, 1::2] = nodes.w_b, between.w_b
+        P = turns_in_a_row(rates, step)
+        return replace(nodes, P=P), P
+
+    def followed(
+        self, start: float, step: float, count: int, lever: Array
+    ) -> tuple[Array, Array, Array]:
+        """Attitude and force at even nodes, in the axes of the first of them.
+
+        Args:
+            start: time of the first node, s.
+            step: s.
+            count: n, of nodes, at least three.
+            lever: (3,) to another place, body axes, m.
+
+        Returns:
+            Body axes at the nodes to those at the first (n, 3, 3); the force (n, 3), m/s^2; the
+            same at the other place: second differences.
+        """
+        loops = compiled_loops()
+        if loops is not None and not self.recorded:
+            made = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
+            loops.followed(*self._samples, start, step, *self._felt, plain(lever), *made)
+            return made
+        t: Array = start + step * np.arange(count, dtype=np.float64)
+        if self.recorded:
+            f_b, R = self.signals(t).f_b, self.recorded_attitude(t)
+        else:
+            nodes, P = self._inside(t[None], np.full(1, step))
+            f_b, R = nodes.f_b[0], P[0]
+        force: Array = (R @ f_b[..., None])[..., 0]
+        place = (R.reshape(-1, 3) @ lever).reshape(-1, 3)
+        swung = np.empty_like(place)
+        swung[1:-1] = (place[2:] - 2.0 * place[1:-1] + place[:-2]) / step**2
+        swung[0], swung[-1] = swung[1], swung[-2]
+        return R, force, force + swung
+
+    def turned_on(self, start: float, step: float, R: Array, t: Array) -> Array:
+        """(k, 3, 3) attitude at times ``t`` (k,): of the node before, turned at the rate half-way.
+
+        Args:
+            start: time of the first node, s.
+            step: s.
+            R: (n, 3, 3) as of :meth:`followed`.
+            t: (k,) s.
+        """
+        if self.recorded:
+            return self.recorded_attitude(t)
+        loops = compiled_loops()
+        if loops is not None:
+            out = np.empty((len(t), 3, 3))
+            loops.turned_on(*self._samples, start, step, self._felt[0], R, plain(t), out)
+            return out
+        i = ((t - start) / step).astype(int)
+        node = start + i * step
+        w = self.signals(0.5 * (t + node)).w_b
+        turned: Array = R[i] @ rotation_from_vector(w * (t - node)[:, None])
+        return turned
 
     def recorded_attitude(self, t: Array) -> Array:
         """(*S, 3, 3) at times ``t`` of shape S, straight arcs between its samples."""

@@ -19,15 +19,16 @@ The prediction is that of what the autopilot *recorded*; unknowns are errors of 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.model.around import Around
-from onboard.core.model.quadrature import Intervals, Signals
+from onboard.core.model.quadrature import Intervals, OfSensors, Signals
 from onboard.errors import OnboardError
 
 
@@ -117,6 +118,22 @@ class Family:
         """(K, M + 1, 3, m) body axes, rad/s per unit; added to the true angular rate."""
         return None
 
+    def gained(self, intervals: Intervals, of: OfSensors) -> Array | None:  # noqa: ARG002
+        """(K, 2, 3, m) integrals of its acceleration, once and twice: :class:`SegmentRegressors`.
+
+        Of an acceleration that is made of what is integrated anyway, which saves what it is at
+        every node; None: it is integrated node by node.
+
+        Args:
+            intervals: K of them.
+            of: integrals of what every model asks of the sensors.
+        """
+        return None
+
+    def turned(self, of: OfSensors) -> Array | None:  # noqa: ARG002
+        """(K, 3, m) integral of its rate, likewise."""
+        return None
+
     def velocity(self, around: Around) -> Direct:  # noqa: ARG002
         """Added to the predicted GPS velocity, m/s per unit."""
         return NOTHING
@@ -134,29 +151,72 @@ class Family:
 class SegmentRegressors:
     """Regressors of K intervals (index k: from epoch k to k + 1) and K + 1 epochs, m unknowns.
 
+    They are made where the filter takes them from: stacks as of
+    :mod:`onboard.core.filter.innovations`, whose column 0 is what is known.
+
     Attributes:
-        force1: (K, 3, m) velocity gained, body axes of the interval's start, m/s per unit.
-        force2: (K, 3, m) the same integrated to the interval's end, m per unit.
-        turn: (K, 3, m) turn of the attitude, body axes of the interval's start, rad per unit.
-        velocity_body: (K + 1, 3, m) direct to the GPS velocity, body axes, m/s per unit.
-        velocity_ned: (K + 1, 3, m) the same in NED.
-        position_body: (K + 1, 3, m) direct to the GPS position, body axes, m per unit.
-        position_ned: (K + 1, 3, m) the same in NED.
-        along_velocity: (K + 1, m) the same as multiples of the velocity, s per unit.
-        attitude_body: (K + 1, 3, m) direct to the recorded attitude, body axes, rad per unit.
-        attitude_ned: (K + 1, 3, m) the same in NED.
+        gained: (K, 9, m + 1) three vectors in body axes of the interval's start per unit: velocity
+            gained, m/s, the same integrated to the interval's end, m, and turn of the attitude,
+            rad.
+        body: (K + 1, 9, m + 1) direct to the GPS velocity, m/s per unit, to the GPS position, m,
+            and to the recorded attitude, rad: body axes.
+        ned: (K + 1, 9, m) the same in NED.
+        along_velocity: (K + 1, m) of the position as multiples of the velocity, s per unit.
+        of_sensors: integrals of what every model asks of the sensors.
+        acting: (c,) unknowns that act in NED; the columns of all others are zero.
     """
 
-    force1: Array
-    force2: Array
-    turn: Array
-    velocity_body: Array
-    velocity_ned: Array
-    position_body: Array
-    position_ned: Array
+    gained: Array
+    body: Array
+    ned: Array
     along_velocity: Array
-    attitude_body: Array
-    attitude_ned: Array
+    of_sensors: OfSensors
+    acting: NDArray[np.int64]
+
+    @property
+    def force1(self) -> Array:
+        """(K, 3, m) velocity gained, body axes of the interval's start, m/s per unit."""
+        return self.gained[:, 0:3, 1:]
+
+    @property
+    def force2(self) -> Array:
+        """(K, 3, m) the same integrated to the interval's end, m per unit."""
+        return self.gained[:, 3:6, 1:]
+
+    @property
+    def turn(self) -> Array:
+        """(K, 3, m) turn of the attitude, body axes of the interval's start, rad per unit."""
+        return self.gained[:, 6:9, 1:]
+
+    @property
+    def velocity_body(self) -> Array:
+        """(K + 1, 3, m) direct to the GPS velocity, body axes, m/s per unit."""
+        return self.body[:, 0:3, 1:]
+
+    @property
+    def position_body(self) -> Array:
+        """(K + 1, 3, m) direct to the GPS position, body axes, m per unit."""
+        return self.body[:, 3:6, 1:]
+
+    @property
+    def attitude_body(self) -> Array:
+        """(K + 1, 3, m) direct to the recorded attitude, body axes, rad per unit."""
+        return self.body[:, 6:9, 1:]
+
+    @property
+    def velocity_ned(self) -> Array:
+        """(K + 1, 3, m) as :attr:`velocity_body`, in NED."""
+        return self.ned[:, 0:3]
+
+    @property
+    def position_ned(self) -> Array:
+        """(K + 1, 3, m) as :attr:`position_body`, in NED."""
+        return self.ned[:, 3:6]
+
+    @property
+    def attitude_ned(self) -> Array:
+        """(K + 1, 3, m) as :attr:`attitude_body`, in NED."""
+        return self.ned[:, 6:9]
 
 
 class Model:
@@ -224,48 +284,48 @@ class Model:
             for f in self.families
             if (signal := f.remembers(segment, before.get(f.name))) is not None
         }
-        return replace(segment, slow=segment.slow | remembered) if remembered else segment
+        return segment.with_slow(segment.slow | remembered) if remembered else segment
 
     def regressors(self, intervals: Intervals, around: Around) -> SegmentRegressors:
         """Evaluate every family on one segment."""
-        m, epochs = self.size, len(around.now.t)
-        force1, force2, turn = (np.zeros((len(intervals.duration), 3, m)) for _ in range(3))
-        direct = {key: np.zeros((epochs, 3, m)) for key in ("vb", "vn", "pb", "pn", "ab", "an")}
-        along = np.zeros((epochs, m))
+        m, K, epochs = self.size, len(intervals.duration), len(around.now.t)
+        gained, body = np.zeros((K, 9, m + 1)), np.zeros((epochs, 9, m + 1))
+        ned, along = np.zeros((epochs, 9, m)), np.zeros((epochs, m))
+        of, acting = intervals.of_sensors(), np.zeros(m, dtype=np.bool_)
         for family in self.families:
-            s = self.slices[family.name]
             if not family.available(around.now):
                 continue
-            a = family.acceleration(intervals.signals)
-            if a is not None:
-                force1[..., s], force2[..., s] = intervals.integrals(a)
-                if family.is_averaged and around.spread is not None:
-                    there = family.acceleration(around.spread.nodes)
-                    if there is not None:
-                        direct["vb"][..., s], direct["pb"][..., s] = around.spread.of(there)
-            w = family.rate(intervals.signals)
-            if w is not None:
-                turn[..., s] = intervals.integrals(w)[0]
-            for key, d in (
-                ("v", family.velocity(around)),
-                ("p", family.position(around)),
-                ("a", family.attitude(around)),
+            s = self.slices[family.name]
+            columns = slice(s.start + 1, s.stop + 1)
+            _accelerated(family, intervals, of, gained[:, :, columns])
+            if family.is_averaged and around.spread is not None:
+                there = family.acceleration(around.spread.nodes)
+                if there is not None:
+                    around.spread.of(there, body[:, 0:3, columns], body[:, 3:6, columns])
+            for first, d in (
+                (0, family.velocity(around)),
+                (3, family.position(around)),
+                (6, family.attitude(around)),
             ):
                 if d.body is not None:
-                    direct[key + "b"][..., s] += d.body
+                    body[:, first : first + 3, columns] += d.body
                 if d.ned is not None:
-                    direct[key + "n"][..., s] = d.ned
+                    ned[:, first : first + 3, s] = d.ned
+                    acting[s] |= d.ned.any(axis=(0, 1))
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
-        return SegmentRegressors(
-            force1,
-            force2,
-            turn,
-            direct["vb"],
-            direct["vn"],
-            direct["pb"],
-            direct["pn"],
-            along,
-            direct["ab"],
-            direct["an"],
-        )
+        return SegmentRegressors(gained, body, ned, along, of, np.flatnonzero(acting))
+
+
+def _accelerated(family: Family, intervals: Intervals, of: OfSensors, out: Array) -> None:
+    """What acceleration and rate of a family gain, into its columns (K, 9, k) of a stack."""
+    both = family.gained(intervals, of)
+    if both is not None:
+        out[:, 0:3], out[:, 3:6] = both[:, 0], both[:, 1]
+    elif (a := family.acceleration(intervals.signals)) is not None:
+        intervals.integrate(a, out[:, 0:3], out[:, 3:6])
+    turn = family.turned(of)
+    if turn is not None:
+        out[:, 6:9] = turn
+    elif (w := family.rate(intervals.signals)) is not None:
+        out[:, 6:9] = intervals.integrals(w)[0]

@@ -16,7 +16,22 @@ from typing import Final
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.model.smoothing import RESOLVED_S, Gained, weight_of_two
+from onboard.core.maths.medians import middle
+from onboard.core.model.linearisation import SHAPES
+from onboard.core.model.smoothing import (
+    RESOLVED_S,
+    Combination,
+    Gained,
+    averaged,
+    averaged_place,
+    change,
+    lagged,
+    mean,
+    paired,
+    slope,
+    times,
+    weight_of_two,
+)
 
 LATER_S: Final = 0.01
 """s to either side at which a response is looked at for how it changes [cost: no sample resolves
@@ -31,6 +46,9 @@ class Response:
     Attributes:
         shapes: (4, K, 3) the other shapes less the even mean over the span, m/s.
         shaped: (K, 3) what their shares make of it, m/s.
+        force: (K, 3) what the response changes by with time, m/s^2.
+        slope: (K, 3) what it changes by with ``window^2``, m/s^3.
+        place: (K, 3) the mean of the place less that at the epoch, m.
         apart: from one epoch to the next, s, as far as the velocity is known.
     """
 
@@ -46,41 +64,39 @@ class Response:
             shares: (4,) of the shapes.
             reach: to either side of an epoch in which the velocity is known, s.
         """
-        self._velocity, self._t, self._window, self._shares = velocity, t, window, shares
-        self._longest = 2.0 * reach
-        self.apart = min(float(np.median(np.diff(t))), reach) if len(t) > 1 else 0.0
-        moments = [t, t + LATER_S, t - LATER_S] if shares.any() else [t]
-        looked = self._less_even(window, np.concatenate(moments)).reshape(4, len(moments), -1, 3)
-        self.shapes: Array = looked[:, 0]
-        self.shaped: Array = np.tensordot(shares, self.shapes, axes=1)
-        self._near: Array = np.tensordot(shares, looked[:, 1:], axes=1)
+        step = velocity.step
+        self.apart = min(middle(np.diff(t)), reach) if len(t) > 1 else 0.0
+        shapes = _less_even(window, self.apart, step)
+        shaped = _shared(shares, shapes)
+        force = mean(window, step) + change(shaped, LATER_S)
+        along = slope(window, 2.0 * reach, step)
+        seen = velocity.seen(t, [*shapes, shaped, force, along, averaged_place(window)], window)
+        self.shapes: Array = seen[: len(SHAPES)]
+        self.shaped, self.force, self.slope, self.place = seen[len(SHAPES) :]
+        if shaped and window >= RESOLVED_S:
+            widths = (1.0 + WIDER) * window, (1.0 - WIDER) * window
+            shares_wide, shares_narrow = (
+                velocity.seen(t, [_shared(shares, _less_even(width, self.apart, step))], width)[0]
+                for width in widths
+            )
+            self.slope += (shares_wide - shares_narrow) / (widths[0] ** 2 - widths[1] ** 2)
 
-    def force(self) -> Array:
-        """(K, 3) what the response changes by with time, m/s^2."""
-        out = self._velocity.mean(self._t, self._window)
-        if len(self._near):
-            after, before = self._near
-            out += (after - before) / (2.0 * LATER_S)
-        return out
 
-    def slope(self) -> Array:
-        """(K, 3) what it changes by with ``window^2``, m/s^3."""
-        out = self._velocity.slope(self._t, self._window, self._longest)
-        if self._shares.any() and self._window >= RESOLVED_S:
-            wide, narrow = (self._window * x for x in (1.0 + WIDER, 1.0 - WIDER))
-            change = self._less_even(wide, self._t) - self._less_even(narrow, self._t)
-            out += np.tensordot(self._shares, change, axes=1) / (wide**2 - narrow**2)
-        return out
+def _less_even(window: float, apart: float, step: float) -> list[Combination]:
+    """The four shapes less the even mean over ``window``, s, of epochs ``apart``, s."""
+    less = weight_of_two(window, apart)
+    if less <= 0.0:
+        return [()] * len(SHAPES)
+    less_even = times(-1.0, averaged(window, step))
+    return [
+        paired(window, less) + less_even,
+        paired(window, 1.0 - less) + less_even,
+        times(0.5, paired(window, 0.25)) + times(-0.5, paired(window, 0.75)),
+        lagged(window) + less_even,
+    ]
 
-    def _less_even(self, window: float, t: Array) -> Array:
-        """(4, k, 3) the shapes less the even mean over ``window``, s, about times ``t`` (k,)."""
-        v, less = self._velocity, weight_of_two(window, self.apart)
-        out = np.zeros((4, len(t), 3))
-        if less <= 0.0:
-            return out
-        even = v.averaged(t, window)
-        newer, older, most_new, most_old = v.paired(t, window, (less, 1.0 - less, 0.25, 0.75))
-        out[0], out[1] = newer - even, older - even
-        out[2] = 0.5 * (most_new - most_old)
-        out[3] = v.lagged(t, window) - even
-        return out
+
+def _shared(shares: Array, shapes: list[Combination]) -> Combination:
+    """What shares (4,) of the shapes make together."""
+    some = zip(shares.tolist(), shapes, strict=True)
+    return tuple(term for share, shape in some if share for term in times(share, shape))

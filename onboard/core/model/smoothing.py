@@ -4,13 +4,16 @@ A receiver whose velocity is the mean over ``window`` seconds centred on the epo
 ``V + (window^2 / 24) V'' + ...``.  Everything that is needed of the exact mean are differences of
 the velocity ``V`` and of the place ``X``, its integral: ``mean(V) = (X(t + window/2) -
 X(t - window/2)) / window``.  So a force is integrated twice, once for a whole segment, and asked
-at two places of an epoch instead of at all samples around it.
+at two places of an epoch instead of at all samples around it.  Whatever else a receiver does is
+such a sum, too (:data:`Combination`), so that all of it is looked up at once.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate, chain
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,19 +42,122 @@ def between_two(window: float, older: float) -> float:
     return window / SPREAD / math.sqrt(older * (1.0 - older))
 
 
+def lag_of(window: float) -> float:
+    """Time constant, s, of a first-order lag that spreads like ``window``, s."""
+    return window / SPREAD
+
+
+Combination: TypeAlias = tuple[tuple[float, float, float, float], ...]
+"""A sum of what is at moments about an epoch: shift of each, s, and weights there of the velocity,
+of the place (1/s) and of the force behind a lag (s).  Two, one behind the other, add up."""
+NOW: Combination = ((0.0, 1.0, 0.0, 0.0),)
+"""The velocity at the epoch itself."""
+
+
+def mean(width: float, step: float) -> Combination:
+    """The mean of the force over ``width``, s, m/s^2; over no less than a ``step`` of nodes, s.
+
+    The derivative of a receiver's averaged velocity: ``d/dt mean(V) = mean(a)``.  The acceleration
+    *at* that moment is mostly vibration, which an averaged velocity does not have: as a regressor
+    of the latency it would be noise.
+    """
+    return change(NOW, 0.5 * max(width, step))
+
+
+def averaged(window: float, step: float) -> Combination:
+    """``mean(V) - V`` for a span of ``window``, s, m/s; the nodes are a ``step`` apart, s."""
+    if window <= 0.0:
+        return ()
+    # Between two nodes it goes with the square of the span, and rounding does not.
+    half = 0.5 * max(window, step)
+    less, share = (window / (2.0 * half)) ** 2, 0.5 / half
+    ends = (half, 0.0, share, 0.0), (-half, 0.0, -share, 0.0)
+    return times(less, ends + times(-1.0, NOW))
+
+
+def averaged_place(window: float) -> Combination:
+    """``mean(X) - X`` for a span of ``window``, s, m.
+
+    Simpson's rule, exact for cubics: the force within the span counts as the mean of its place
+    weighs it.  That *at* the epoch is mostly vibration; times the span squared it would be a noise
+    of the height that goes with the force, and so a scale.
+    """
+    half = 0.5 * window
+    ends = (half, 0.0, 1.0 / 6.0, 0.0), (-half, 0.0, 1.0 / 6.0, 0.0)
+    return (*ends, (0.0, 0.0, -1.0 / 3.0, 0.0))
+
+
+def paired(window: float, older: float = 0.5) -> Combination:
+    """``mean(V) - V`` of two moments that spread like ``window``, s, and have their mean now, m/s.
+
+    Args:
+        window: s.
+        older: weight of the older one, between 0 and 1.
+    """
+    apart = between_two(window, older)
+    newest, oldest = older * apart, (older - 1.0) * apart
+    both = (newest, 1.0 - older, 0.0, 0.0), (oldest, older, 0.0, 0.0)
+    return both + times(-1.0, NOW)
+
+
+def lagged(window: float) -> Combination:
+    """``lag(V) - V`` of a first-order lag that spreads like ``window``, s, m/s.
+
+    Its time constant (:func:`lag_of`) is its spread and its delay, which counts as latency: it is
+    looked at so much later.  A lagged velocity is ``V`` less the time constant times the lagged
+    force.
+    """
+    lag = lag_of(window)
+    return () if lag <= 0.0 else ((lag, 1.0, 0.0, -lag), *times(-1.0, NOW))
+
+
+def slope(window: float, longest: float, step: float) -> Combination:
+    """Derivative of :func:`averaged` to ``window^2``, m/s^3; the limit ``V'' / 24`` at zero.
+
+    Args:
+        window: s.
+        longest: span that the nodes allow, s.
+        step: from node to node, s.
+    """
+    # The effect of a shorter span is the second derivative, whose best estimate is that over
+    # one which is resolved.
+    if window < RESOLVED_S:
+        return times(RESOLVED_S**-2, averaged(RESOLVED_S, step))
+    high, low = min(1.02 * window, longest), 0.98 * window
+    share = 1.0 / (high**2 - low**2)
+    return times(share, averaged(high, step)) + times(-share, averaged(low, step))
+
+
+def times(weight: float, of: Combination) -> Combination:
+    """A combination with all its weights multiplied."""
+    return tuple((shift, weight * v, weight * x, weight * z) for shift, v, x, z in of)
+
+
+def change(of: Combination, by: float) -> Combination:
+    """What a combination changes by in time, 1/s, looked at ``by`` seconds to either side."""
+    return tuple(
+        (shift + side * by, side * v / (2.0 * by), side * x / (2.0 * by), side * z / (2.0 * by))
+        for side in (1.0, -1.0)
+        for shift, v, x, z in of
+    )
+
+
 class Gained:
     """An acceleration, straight lines between equidistant nodes, integrated twice and exactly.
 
     Vibration that the nodes resolve is cancelled, whatever the span.
+
+    Attributes:
+        step: from node to node, s.
     """
 
-    __slots__ = ("_a", "_late", "_start", "_step", "_v", "_x")
+    __slots__ = ("_a", "_late", "_start", "_v", "_x", "step")
 
     def __init__(self, start: float, step: float, a: Array) -> None:
         """Take ``a`` (n, 3), m/s^2, axes that do not turn, at ``start + i step``, s; n >= 2."""
         self._a = plain(a)
         self._v, self._x = v, x = np.zeros_like(self._a), np.zeros_like(self._a)
-        self._start, self._step = start, step
+        self._start, self.step = start, step
         self._late: tuple[float, Array] | None = None
         loops = compiled_loops()
         if loops is not None:
@@ -60,113 +166,64 @@ class Gained:
         np.cumsum(0.5 * step * (a[:-1] + a[1:]), axis=0, out=v[1:])
         x[1:] = np.cumsum(step * v[:-1] + step**2 / 6.0 * (2.0 * a[:-1] + a[1:]), axis=0)
 
-    def moments(self, t: Array, shifts: Sequence[float] = (0.0,)) -> tuple[Array, Array]:
-        """Velocity, m/s, and place, m, at ``t + shift`` for each of S shifts (s): (S, k, 3) each.
+    def seen(self, t: Array, of: Sequence[Combination], window: float = 0.0) -> Array:
+        """Combinations of what is about times ``t`` (k,), in one go: (S, k, 3) of S of them.
 
-        All at once: of a dozen moments about an epoch each would cost a call of its own.
+        Args:
+            t: (k,) s.
+            of: S combinations.
+            window: s, whose :func:`lag_of` the force is behind where a lag is in them.
         """
-        at = (t + np.array(shifts)[:, None]).ravel()
+        out = np.zeros((len(of), len(t), 3))
+        ends = np.array(list(accumulate(map(len, of))))
+        terms = np.array(list(chain.from_iterable(chain.from_iterable(of)))).reshape(-1, 4)
+        lag = lag_of(window) if terms[:, 3].any() else 0.0
+        late = self._lagged_force(lag) if lag > 0.0 else self._a
         loops = compiled_loops()
-        if loops is None:
-            i, s, a, slope = self._since_node(at)
-            velocity = self._v[i] + s * (a + 0.5 * s * slope)
-            place = self._x[i] + s * (self._v[i] + s * (0.5 * a + s / 6.0 * slope))
-        else:
-            velocity, place = np.empty((len(at), 3)), np.empty((len(at), 3))
-            loops.gained(self._start, self._step, self._a, self._v, self._x, at, velocity, place)
-        shape = len(shifts), len(t), 3
-        return velocity.reshape(shape), place.reshape(shape)
+        if loops is not None:
+            gained = self._start, self.step, self._a, self._v, self._x, late, lag
+            loops.seen(*gained, plain(t), terms, ends, out)
+            return out
+        for i, one in enumerate(np.split(terms, ends[:-1])):
+            for shift, of_velocity, of_place, of_force in one.tolist():
+                at, s, a, along = self._since_node(t + shift)
+                v = self._v[at]
+                out[i] += of_velocity * (v + s * (a + 0.5 * s * along))
+                if of_place:
+                    out[i] += of_place * (self._x[at] + s * (v + s * (0.5 * a + s / 6.0 * along)))
+                if of_force:
+                    kept = np.exp(-s / lag)
+                    behind = kept * late[at] + (1.0 - kept) * (a - lag * along) + along * s
+                    out[i] += of_force * behind
+        return out
 
     def _since_node(self, t: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
         """The node before times ``t`` (k,), s since then (k, 1), the force there and its slope."""
         since = t - self._start
-        i = np.clip((since / self._step).astype(int), 0, len(self._a) - 2)
-        s = (since - i * self._step)[:, None]
+        i = np.clip((since / self.step).astype(int), 0, len(self._a) - 2)
+        s = (since - i * self.step)[:, None]
         a = self._a[i]
-        return i, s, a, (self._a[i + 1] - a) / self._step
+        return i, s, a, (self._a[i + 1] - a) / self.step
 
     def velocity(self, t: Array) -> Array:
         """(k, 3) gained since the first node until times ``t`` (k,), m/s."""
-        velocity: Array = self.moments(t)[0][0]
+        velocity: Array = self.seen(t, [NOW])[0]
         return velocity
-
-    def mean(self, t: Array, width: float) -> Array:
-        """Mean of the force over ``width`` (s) about times ``t`` (k,): (k, 3), m/s^2.
-
-        The derivative of a receiver's averaged velocity: ``d/dt mean(V) = mean(a)``.  The
-        acceleration *at* that moment is mostly vibration, which an averaged velocity does not have:
-        as a regressor of the latency it would be noise.  No span is shorter than two nodes.
-        """
-        half = 0.5 * max(width, self._step)
-        after, before = self.moments(t, (half, -half))[0]
-        out: Array = (after - before) / (2.0 * half)
-        return out
-
-    def averaged(self, t: Array, window: float) -> Array:
-        """``mean(V) - V`` for a span of ``window``, s, about times ``t`` (k,): (k, 3), m/s."""
-        if window <= 0.0:
-            return np.zeros((len(t), 3))
-        # Between two nodes it goes with the square of the span, and rounding does not.
-        half = 0.5 * max(window, self._step)
-        velocity, place = self.moments(t, (0.0, half, -half))
-        mean = (place[1] - place[2]) / (2.0 * half)
-        out: Array = (mean - velocity[0]) * (window / (2.0 * half)) ** 2
-        return out
-
-    def averaged_place(self, t: Array, window: float) -> Array:
-        """``mean(X) - X`` for a span of ``window``, s, about times ``t`` (k,): (k, 3), m.
-
-        Simpson's rule, exact for cubics: the force within the span counts as the mean of its place
-        weighs it.  That *at* the epoch is mostly vibration; times the span squared it would be a
-        noise of the height that goes with the force, and so a scale.
-        """
-        half = 0.5 * window
-        now, after, before = self.moments(t, (0.0, half, -half))[1]
-        out: Array = (after + before - 2.0 * now) / 6.0
-        return out
-
-    def paired(self, t: Array, window: float, older: Sequence[float] = (0.5,)) -> Array:
-        """``mean(V) - V`` of two moments that spread like ``window``, s: (S, k, 3), m/s.
-
-        Args:
-            t: (k,) s, where the mean of the two is.
-            window: s.
-            older: S weights of the older one, between 0 and 1.
-        """
-        apart = [between_two(window, weight) for weight in older]
-        newest = [weight * a for weight, a in zip(older, apart, strict=True)]
-        oldest = [(weight - 1.0) * a for weight, a in zip(older, apart, strict=True)]
-        velocity = self.moments(t, (0.0, *newest, *oldest))[0]
-        weight = np.array(older)[:, None, None]
-        new, old = velocity[1 : 1 + len(older)], velocity[1 + len(older) :]
-        out: Array = (1.0 - weight) * new + weight * old - velocity[0]
-        return out
-
-    def lagged(self, t: Array, window: float) -> Array:
-        """``lag(V) - V`` of a first-order lag that spreads like ``window``, s: (k, 3), m/s.
-
-        Its time constant is its spread and its delay, which counts as latency: it is looked at so
-        much later.  A lagged velocity is ``V`` less the time constant times the lagged force.
-        """
-        lag = window / SPREAD
-        if lag <= 0.0:
-            return np.zeros((len(t), 3))
-        i, s, a, slope = self._since_node(t + lag)
-        kept = np.exp(-s / lag)
-        force = kept * self._lagged_force(lag)[i] + (1.0 - kept) * (a - lag * slope) + slope * s
-        now, later = self.moments(t, (0.0, lag))[0]
-        out: Array = later - lag * force - now
-        return out
 
     def _lagged_force(self, lag: float) -> Array:
         """(n, 3) the force at the nodes behind a first-order lag, s; it began as its mean was."""
         if self._late is not None and self._late[0] == lag:
             return self._late[1]
-        a, x = self._a, self._step / lag
-        kept = np.exp(-x)
+        a, x = self._a, self.step / lag
+        kept = math.exp(-x)
         share = (1.0 - kept) / x  # straight lines between nodes: exact
         z = np.empty_like(a)
         z[0] = a[: int(1.0 / x) + 1].mean(axis=0)
+        loops = compiled_loops()
+        if loops is not None:
+            loops.late(kept, share, a, z)
+            self._late = lag, z
+            return z
         z[1:] = (share - kept) * a[:-1] + (1.0 - share) * a[1:]
         # What one node keeps of the one before, two keep squared: doubled until nothing is left.
         k = 1
@@ -175,23 +232,3 @@ class Gained:
             k *= 2
         self._late = lag, z
         return z
-
-    def slope(self, t: Array, window: float, longest: float) -> Array:
-        """Derivative of :meth:`averaged` to ``window^2``; the limit ``V'' / 24`` at zero.
-
-        Args:
-            t: (k,) s.
-            window: s.
-            longest: span that the nodes allow, s.
-
-        Returns:
-            (k, 3) m/s^3.
-        """
-        # The effect of a shorter span is the second derivative, whose best estimate is that over
-        # one which is resolved.
-        if window < RESOLVED_S:
-            limit: Array = self.averaged(t, RESOLVED_S) / RESOLVED_S**2
-            return limit
-        high, low = min(1.02 * window, longest), 0.98 * window
-        out: Array = (self.averaged(t, high) - self.averaged(t, low)) / (high**2 - low**2)
-        return out

@@ -48,27 +48,28 @@ class Spread:
     velocity: Array
     place: Array
 
-    def of(self, acceleration: Array) -> tuple[Array, Array]:
-        """What is reported beside velocity and place: each (K, 3, m), body axes of the epochs.
+    def of(self, acceleration: Array, velocity: Array, place: Array) -> None:
+        """What is reported beside velocity and place, body axes of the epochs.
 
         Args:
             acceleration: (n, 3, m) at the nodes, body axes, m/s^2 per unit.
+            velocity: (K, 3, m) written to.
+            place: (K, 3, m) written to.
         """
         loops = compiled_loops()
         n, _, m = acceleration.shape
         K = len(self.at)
         if loops is not None:
-            one, two, between = np.zeros((K, 3, m)), np.zeros((K, 3, m)), np.empty((n, 3, m))
-            turns, first = (plain(self.R), plain(self.R_epoch)), np.ascontiguousarray(self.at[:, 0])
-            of = plain(self.velocity), plain(self.place), plain(acceleration)
-            loops.spread(*turns, first, *of, between, one, two)
-            return one, two
+            turns, first = (self.R, plain(self.R_epoch)), self.at[:, 0].copy()
+            of = self.velocity, self.place, plain(acceleration)
+            loops.spread(*turns, first, *of, velocity, place)
+            return
         there = np.clip(self.at, 0, n - 1)
         weights = np.where(there == self.at, np.stack((self.velocity, self.place)), 0.0)
         turned = (self.R @ acceleration).reshape(n, 3 * m)
         both = weights.swapaxes(0, 1) @ turned[there]
         back = np.swapaxes(self.R_epoch, -1, -2)[:, None] @ both.reshape(K, 2, 3, m)
-        return back[:, 0], back[:, 1]
+        velocity[:], place[:] = back[:, 0], back[:, 1]
 
 
 def reaches(window: float, apart: float, h: Array) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """A jump is placed from the flight around it and the sums of the rest; a shock is no jump."""
 
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,6 +89,14 @@ def test_another_examination_of_a_flight_begins_with_what_this_one_knows(full):
     mine = other.indices(jump)
     own = np.diag(other.known.covariance)[mine]
     np.testing.assert_allclose(own, other.model.prior_sigma[mine] ** 2)
+
+
+def test_an_examination_goes_with_its_last_reference(full):
+    """What it keeps of a flight are megabytes, which must not wait for cycles to be collected."""
+    other = full.beside(())
+    gone = weakref.ref(other)
+    del other
+    assert gone() is None
 
 
 def gains(full, times):

@@ -53,8 +53,9 @@ def turned(rng):
 
 
 def step_of(rng, m):
-    shapes = ((3, 3), (3,), (3,), (3, 3), (3, m), (3, m), (3, m))
-    integrals = (0.3 * rng.normal(size=(1, *s)) for s in shapes)
+    shapes = ((3, 3), (2, 3), (3, 3), (9, m + 1))
+    integrals = [0.3 * rng.normal(size=(1, *s)) for s in shapes]
+    integrals[-1][:, :, 0] = 0.0
     missed, stated = rng.uniform(0.0, 0.1, size=(1, 6)), rng.uniform(0.1, 10.0, size=1)
     return steps(np.array([0.2]), *integrals, missed, stated)[0]
 

@@ -254,8 +254,9 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         missed = BLOW_SIGMA if k % BLOW_EVERY == 0 else np.zeros(6)
         v = v + R @ P.T @ (missed[:3] * normal(size=3))
         R = R @ P.T @ rotation_from_vector(missed[3:] * normal(size=3)) @ P
-        no_turn = np.zeros((3, 1))
-        integrals = (P, force, to_end, mean, force[:, None], to_end[:, None], no_turn, missed**2)
+        both = np.stack([force, to_end])
+        stack = np.stack([np.zeros(9), np.concatenate([*both, np.zeros(3)])], axis=1)
+        integrals = (P, both, mean, stack, missed**2)
         leads_to = np.array([stated(k + 1)])
         step = steps(np.array([T]), *(x[None] for x in integrals), leads_to)[0]
         filter_.predict(step, theta, 0.0)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from onboard.core.filter.noise_step import bounded
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
@@ -73,9 +74,9 @@ def test_attitude_between_samples_is_the_same(seed, turn, delay):
     np.testing.assert_allclose(other @ np.swapaxes(other, 1, 2), np.eye(3) + 0 * one, atol=1e-12)
 
 
-@given(SEEDS)
+@given(SEEDS, st.sampled_from([None, (0.1, 0.2, -0.1, 0.3)]))
 @settings(max_examples=20, deadline=None)
-def test_nodes_and_integrals_are_the_same(seed):
+def test_nodes_and_integrals_are_the_same(seed, shares):
     rng = np.random.default_rng(seed)
     flown = segment(rng)
     six = np.array([1.01, 0.99, 1.02, 0.1, -0.2, 0.3])
@@ -85,11 +86,13 @@ def test_nodes_and_integrals_are_the_same(seed):
     def made():
         maker = NodeMaker(flown, np.array([0.01, -0.02, 0.03]), six)
         inside = maker.intervals(start[:-1], start[1:])
-        near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]))
+        shaped = None if shares is None else np.array(shares)
+        near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]), shaped)
         force = inside.signals.f_b[..., None] * x
         signals = (inside.signals.w_b, inside.signals.raw_s, inside.signals.slow("signal"))
-        seen = (near.f_mean, near.averaged, near.slope, near.shapes)
-        return (inside.P, *inside.integrals(force), *signals, *seen, near.R, near.swing)
+        seen = (near.f_mean, near.averaged, near.averaged_place, near.slope, near.shapes)
+        of = inside.of_sensors().both
+        return (inside.P, of, *inside.integrals(force), *signals, *seen, near.R, near.swing)
 
     for one, other in zip(*both_ways(made), strict=True):
         np.testing.assert_allclose(other, one, atol=1e-10 * (1.0 + np.abs(one).max()))
@@ -105,8 +108,13 @@ def test_what_a_receiver_makes_of_accelerations_is_the_same(seed, window, lag):
     maker = NodeMaker(flown, np.zeros(3), np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     made = around(maker, epoch, window, None, np.array([0.1, 0.2, 0.0, lag])).spread
     x = rng.normal(size=(len(made.R), 3, 5))
-    for one, other in zip(*both_ways(lambda: made.of(x)), strict=True):
-        assert one.shape == (8, 3, 5)
+
+    def of():
+        out = np.empty((8, 6, 5))
+        made.of(x, out[:, 0:3], out[:, 3:6])
+        return [out]
+
+    for one, other in zip(*both_ways(of), strict=True):
         np.testing.assert_allclose(other, one, atol=1e-12 * (1.0 + np.abs(one).max()))
 
 
@@ -117,3 +125,13 @@ def test_what_is_dragged_is_the_same(seed, n):
     load, start = np.cumsum(rng.normal(size=n)), rng.normal(size=len(PLAYS))
     one, other = both_ways(lambda: _dragged(load, start))
     np.testing.assert_array_equal(other, one)
+
+
+@given(SEEDS, st.integers(1, 20))
+@settings(max_examples=30, deadline=None)
+def test_a_maximum_between_bounds_is_the_same(seed, n):
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(n, n))
+    H, slope = root @ root.T + 0.5 * np.eye(n), rng.normal(size=n)
+    one, other = both_ways(lambda: bounded(H, slope, np.full(n, -0.3), np.full(n, 0.2)))
+    np.testing.assert_allclose(other, one, atol=1e-9)

@@ -8,7 +8,17 @@ from hypothesis import strategies as st
 from onboard.core.inputs.segments import Segment
 from onboard.core.model.around import AROUND_SPAN_S, around
 from onboard.core.model.quadrature import NodeMaker
-from onboard.core.model.smoothing import RESOLVED_S, Gained, weight_of_two
+from onboard.core.model.smoothing import (
+    RESOLVED_S,
+    Gained,
+    averaged,
+    averaged_place,
+    lagged,
+    mean,
+    paired,
+    slope,
+    weight_of_two,
+)
 from tests.core.model.test_quadrature import NOMINAL, attitude, force, maker, rates
 
 EPOCH = np.array([0.4, 1.5, 2.6])
@@ -19,6 +29,11 @@ def gained(a, seconds=2.0, step=0.01):
     """Of a force along x, a function of time, around one second."""
     t = step * np.arange(round(seconds / step) + 1)
     return Gained(0.0, step, np.stack([a(t - 1.0), 0.0 * t, 0.0 * t], axis=-1))
+
+
+def even(made, t, window):
+    """Mean over a span less the velocity, about times ``t``."""
+    return made.seen(t, [averaged(window, made.step)])[0]
 
 
 def at(x):
@@ -87,8 +102,8 @@ def test_smoothing_is_the_average_of_the_velocity(window):
         fine = np.linspace(-window / 2, window / 2, 20001)
         mean = np.mean(-np.cos(frequency * fine + phase) / frequency) if window else 0.0
         now = -np.cos(phase) / frequency if window else 0.0
-        got = gained(lambda t, f=frequency, p=phase: np.sin(f * t + p)).averaged(NOW, window)
-        assert at(got) == pytest.approx(mean - now, abs=2e-4)
+        made = gained(lambda t, f=frequency, p=phase: np.sin(f * t + p))
+        assert at(even(made, NOW, window)) == pytest.approx(mean - now, abs=2e-4)
 
 
 @pytest.mark.parametrize("window", [0.0, 0.1, 0.346, 0.8])
@@ -97,7 +112,7 @@ def test_a_place_is_averaged_as_the_velocity_is(window):
     for w, phase in ((3.0, 0.3), (6.0, 1.1)):
         x = -np.sin(w * np.linspace(-window / 2, window / 2, 20001) + phase) / w**2
         made = gained(lambda t, w=w, p=phase: np.sin(w * t + p))
-        got = at(made.averaged_place(NOW, window))
+        got = at(made.seen(NOW, [averaged_place(window)])[0])
         assert got == pytest.approx(x.mean() - x[10000], abs=1e-5 + window**4 * w**2 / 2880.0)
 
 
@@ -105,26 +120,31 @@ def test_a_place_knows_next_to_nothing_of_vibration():
     """That at the epoch, taken for the mean over the span, would move it by centimetres."""
     w, window = 2.0 * np.pi * 30.0, 0.3
     made = gained(lambda t: 10.0 * np.cos(w * t), step=0.005)
-    assert abs(at(made.averaged_place(NOW, window))) < 10.0 / w**2 < 0.01 * window**2 * 10.0
+    assert (
+        abs(at(made.seen(NOW, [averaged_place(window)])[0])) < 10.0 / w**2 < 0.01 * window**2 * 10.0
+    )
 
 
 @pytest.mark.parametrize("window", [1e-9, 1e-6, 1e-3])
 def test_the_shortest_spans_go_with_their_square(window):
-    got = gained(lambda t: 9.8 + 2.0 * t).averaged(NOW, window)
+    got = even(gained(lambda t: 9.8 + 2.0 * t), NOW, window)
     assert at(got) == pytest.approx(window**2 / 24.0 * 2.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("window", [0.15, 0.3, 0.42])
 def test_smoothing_slope_is_its_derivative(window):
     made, step = gained(lambda t: np.sin(4.0 * t + 0.5)), 0.03
-    above, below = (made.averaged(NOW, np.sqrt(window**2 + s * step**2)) for s in (1, -1))
+    above, below = (even(made, NOW, np.sqrt(window**2 + s * step**2)) for s in (1, -1))
     numeric = at(above - below) / (2 * step**2)
-    assert at(made.slope(NOW, window, LONGEST)) == pytest.approx(numeric, rel=0.01)
+    assert at(made.seen(NOW, [slope(window, LONGEST, made.step)])[0]) == pytest.approx(
+        numeric, rel=0.01
+    )
 
 
 def test_smoothing_slope_of_a_short_window_is_the_second_derivative():
     # V = t^2 / 2 + ...: V'' = a' is 1 everywhere, at 1/24 per s^2 of window^2.
-    got = gained(lambda t: t + 3.0).slope(NOW, 0.0, LONGEST)
+    made = gained(lambda t: t + 3.0)
+    got = made.seen(NOW, [slope(0.0, LONGEST, made.step)])[0]
     assert at(got) == pytest.approx(1.0 / 24.0, rel=1e-6)
 
 
@@ -141,9 +161,9 @@ def test_two_moments_and_a_lag_are_what_they_are_called(window):
     made = gained(lambda t: np.sin(w * t + 0.7))
     lag = np.sum(share * velocity(tau - u)) / share.sum() - velocity(0.0)
     began = np.exp(-1.0 / tau)  # of what was before the first node
-    assert at(made.lagged(NOW, window)) == pytest.approx(lag, abs=2e-4 + began)
+    assert at(made.seen(NOW, [lagged(window)], window)[0]) == pytest.approx(lag, abs=2e-4 + began)
     pair = 0.5 * (velocity(tau) + velocity(-tau)) - velocity(0.0)
-    assert at(made.paired(NOW, window)[0]) == pytest.approx(pair, abs=1e-4)
+    assert at(made.seen(NOW, [paired(window)])[0]) == pytest.approx(pair, abs=1e-4)
 
 
 @given(st.floats(0.02, 0.98), st.floats(0.05, 0.4))
@@ -156,20 +176,20 @@ def test_what_is_interpolated_between_two_epochs_is_two_moments(share, apart):
     window = apart * np.sqrt(12.0 * share * (1.0 - share))
     older = weight_of_two(window, apart)
     assert older == pytest.approx(min(share, 1.0 - share), abs=1e-6)
-    got = made.paired(NOW, window, (older if share < 0.5 else 1.0 - older,))[0]
+    got = made.seen(NOW, [paired(window, older if share < 0.5 else 1.0 - older)])[0]
     assert at(got) == pytest.approx(at(seen - made.velocity(NOW)), abs=1e-6)
 
 
 @pytest.mark.parametrize("window", [1e-6, 0.01, 0.13, 0.5])
 def test_whatever_its_shape_a_response_that_spreads_alike_bends_a_ramp_alike(window):
     made = gained(lambda t: 3.0 * t - 2.0)
-    even = at(made.averaged(NOW, window))
-    assert even == pytest.approx(window**2 / 24.0 * 3.0, rel=1e-6)
+    bent = at(even(made, NOW, window))
+    assert bent == pytest.approx(window**2 / 24.0 * 3.0, rel=1e-6)
     began = np.exp(-1.0 * np.sqrt(12.0) / window)
-    pairs = made.paired(NOW, window, (0.5, 0.25, 0.9))
-    for got in (*pairs, made.lagged(NOW, window)):
-        assert at(got) == pytest.approx(even, rel=1e-5 + 50.0 * began, abs=1e-13)
-    older, newer = (at(pair) for pair in made.paired(NOW, window, (0.25, 0.75)))
+    shapes = *(paired(window, older) for older in (0.5, 0.25, 0.9)), lagged(window)
+    for got in made.seen(NOW, shapes, window):
+        assert at(got) == pytest.approx(bent, rel=1e-5 + 50.0 * began, abs=1e-13)
+    older, newer = (at(x) for x in made.seen(NOW, [paired(window, w) for w in (0.25, 0.75)]))
     assert older - newer == pytest.approx(0.0, abs=1e-13)
 
 
@@ -188,8 +208,9 @@ def test_a_mean_is_that_of_straight_lines(centre, width):
     t = 0.01 * np.arange(201)
     fine = 1.0 + centre + np.linspace(-width / 2, width / 2, 200_001)
     made = Gained(0.0, 0.01, np.stack([y, y, y], axis=-1))
-    mean = float(np.mean(np.interp(fine, t, y)))
-    assert at(made.mean(NOW + centre, width)) == pytest.approx(mean, abs=1e-4)
+    brute = float(np.mean(np.interp(fine, t, y)))
+    got = made.seen(NOW + centre, [mean(width, made.step)])[0]
+    assert at(got) == pytest.approx(brute, abs=1e-4)
 
 
 @pytest.mark.parametrize("window", [0.1, 0.35, 0.66])
@@ -198,9 +219,9 @@ def test_an_averaged_velocity_changes_by_its_averaged_acceleration(window):
     noise = 2.0 * np.random.default_rng(2).normal(size=201)
     made = gained(lambda t: np.sin(3.0 * t) + noise)
 
-    def mean(t):
-        return at(made.averaged(np.array([t]), window) + made.velocity(np.array([t])))
+    def of_velocity(t):
+        return at(even(made, np.array([t]), window) + made.velocity(np.array([t])))
 
     e = 1e-4
-    numeric = (mean(1.0 + e) - mean(1.0 - e)) / (2.0 * e)
-    assert at(made.mean(NOW, window)) == pytest.approx(numeric, abs=1e-3)
+    numeric = (of_velocity(1.0 + e) - of_velocity(1.0 - e)) / (2.0 * e)
+    assert at(made.seen(NOW, [mean(window, made.step)])[0]) == pytest.approx(numeric, abs=1e-3)

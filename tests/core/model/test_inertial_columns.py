@@ -14,6 +14,8 @@ from onboard.core.model.nuisances import (
 )
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.model.regressors import Model
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.gravity import Gravity
 
 H = 5e-4
 T = np.arange(0.0, 3.0 + H / 2, H)
@@ -121,3 +123,17 @@ def test_a_late_gyroscope_gives_an_attitude_of_the_past(made):
 
     want = (by(d) - by(-d)) / (2 * d * H)
     np.testing.assert_allclose(columns(made, GyroTiming()).force1[0, :, 0], want, atol=2e-3)
+
+
+@pytest.mark.parametrize("family", [Six(), GyroTiming(), Gravity(Origin(0.0))])
+def test_what_is_gained_is_the_integral_of_the_acceleration(made, family):
+    intervals, _ = made
+    got = family.gained(intervals, intervals.of_sensors())
+    want = np.stack(intervals.integrals(family.acceleration(intervals.signals)), axis=1)
+    np.testing.assert_allclose(got, want, atol=1e-12)
+
+
+def test_what_is_turned_is_the_integral_of_the_rate(made):
+    intervals, _ = made
+    want = intervals.integrals(GyroScale().rate(intervals.signals))[0]
+    np.testing.assert_allclose(GyroScale().turned(intervals.of_sensors()), want, atol=1e-13)

@@ -5,7 +5,7 @@ import pytest
 
 from onboard.core.model.linearisation import SHAPES
 from onboard.core.model.response import Response
-from onboard.core.model.smoothing import SPREAD, Gained
+from onboard.core.model.smoothing import SPREAD, Gained, averaged
 
 REACH = 0.62
 STEP = 0.02
@@ -39,7 +39,7 @@ def response(gained, window, shares, t=T):
 def value(gained, window, shares, t=T):
     """What a receiver reports of the velocity gained."""
     more = response(gained, window, shares, t).shaped
-    return gained.velocity(t) + gained.averaged(t, window) + more
+    return gained.velocity(t) + gained.seen(t, [averaged(window, gained.step)])[0] + more
 
 
 MIXED = (0.4, 0.2, -0.3, 0.25)
@@ -50,7 +50,7 @@ MIXED = (0.4, 0.2, -0.3, 0.25)
 def test_its_force_is_what_it_changes_by_with_time(gained, window, shares):
     h = 0.02
     change = value(gained, window, shares, T + h) - value(gained, window, shares, T - h)
-    force = response(gained, window, shares).force()
+    force = response(gained, window, shares).force
     # An acceleration of 2.5 Hz bends by 1.6 % over h, and that of the even mean is the mean's.
     assert force == pytest.approx(change / (2.0 * h), abs=0.03 * np.abs(force).max())
 
@@ -60,7 +60,7 @@ def test_its_force_is_what_it_changes_by_with_time(gained, window, shares):
 def test_its_slope_is_what_it_changes_by_with_the_square_of_the_span(gained, window, shares):
     wide, narrow = np.sqrt(window**2 + 1e-3), np.sqrt(window**2 - 1e-3)
     change = (value(gained, wide, shares) - value(gained, narrow, shares)) / 2e-3
-    slope = response(gained, window, shares).slope()
+    slope = response(gained, window, shares).slope
     assert slope == pytest.approx(change, abs=0.02 * np.abs(slope).max())
 
 
@@ -80,7 +80,7 @@ def fitted(gained, seen, passes, *, shaped):
     for _ in range(passes):
         taken = shares if shaped else np.zeros(4)
         made = response(gained, window, taken)
-        columns = np.concatenate([made.slope()[None], made.shapes]).reshape(1 + len(SHAPES), -1)
+        columns = np.concatenate([made.slope[None], made.shapes]).reshape(1 + len(SHAPES), -1)
         left = seen - value(gained, window, taken)
         # Shares are weights: a prior of one beside noise of 1 cm/s.
         prior = np.diag([0.0, *(1e-4,) * len(SHAPES)])

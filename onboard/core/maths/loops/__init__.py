@@ -5,22 +5,30 @@ Equal to numpy's way to rounding (no fast-math): :class:`~onboard.core.maths.int
 held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
 """
 
+from onboard.core.maths.loops.bounded import bounded
 from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
-from onboard.core.maths.loops.integrals import gained, integrals, spread, twice
+from onboard.core.maths.loops.integrals import OWN, integrals, late, own, seen, spread, twice
 from onboard.core.maths.loops.kalman import kalman_errors
-from onboard.core.maths.loops.turns import attitudes, turns_in_a_row
+from onboard.core.maths.loops.nodes import followed, inside, turned_on
+from onboard.core.maths.loops.turns import attitudes
 
 __all__ = [
+    "OWN",
     "attitudes",
+    "bounded",
     "cubics",
     "dragged",
-    "gained",
+    "followed",
+    "inside",
     "integrals",
     "kalman_errors",
+    "late",
+    "own",
+    "seen",
     "signals",
     "spread",
     "straight",
-    "turns_in_a_row",
+    "turned_on",
     "twice",
     "values",
 ]

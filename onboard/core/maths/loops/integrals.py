@@ -23,32 +23,74 @@ def twice(step: float, a: Array, v: Array, x: Array) -> None:
             )
 
 
-@compiled("void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1])")
-def gained(
+@compiled("void(f8, f8, f8[:,::1], f8[:,::1])")
+def late(kept: float, share: float, a: Array, z: Array) -> None:
+    """A force (n, 3) behind a first-order lag, from what is in the first row of ``z`` (n, 3) on."""
+    for i in range(len(a) - 1):
+        for c in range(3):
+            z[i + 1, c] = kept * z[i, c] + (share - kept) * a[i, c] + (1.0 - share) * a[i + 1, c]
+
+
+@compiled(
+    "void(f8, f8, f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8, f8[::1], f8[:,::1], i8[::1], "
+    "f8[:,:,::1])"
+)
+def seen(
     start: float,
     step: float,
     a: Array,
     v: Array,
     x: Array,
+    z: Array,
+    lag: float,
     t: Array,
-    velocity: Array,
-    place: Array,
+    terms: Array,
+    ends: NDArray[np.int64],
+    out: Array,
 ) -> None:
-    """Integrals of :func:`twice` at times ``t`` (k,), into two (k, 3)."""
-    last = len(a) - 2
-    for k in range(len(t)):
-        at = t[k] - start
-        i = min(max(int(at / step), 0), last)
-        s = at - i * step
-        for c in range(3):
-            slope = (a[i + 1, c] - a[i, c]) / step
-            velocity[k, c] = v[i, c] + s * (a[i, c] + 0.5 * s * slope)
-            place[k, c] = x[i, c] + s * (v[i, c] + s * (0.5 * a[i, c] + s / 6.0 * slope))
+    """Sums of velocity and place of :func:`twice` and of the force of :func:`late` about times.
+
+    Args:
+        start: time of the first node, s.
+        step: s.
+        a: (n, 3) force.
+        v: (n, 3).
+        x: (n, 3).
+        z: (n, 3) force behind a lag.
+        lag: s; 0: no term asks for it.
+        t: (k,) s.
+        terms: (T, 4) shift of the time, weights of velocity, place and lagged force.
+        ends: (S,) number behind the last term of each sum.
+        out: (S, k, 3) zero; written to.
+    """
+    last, j, per_s = len(a) - 2, 0, 1.0 / step
+    for one in range(len(ends)):
+        while j < ends[one]:
+            shift, of_v, of_x, of_z = terms[j, 0], terms[j, 1], terms[j, 2], terms[j, 3]
+            for k in range(len(t)):
+                at = t[k] + shift - start
+                i = min(max(int(at / step), 0), last)
+                s = at - i * step
+                half, sixth = 0.5 * s, s * per_s / 6.0
+                # Of v + s (a + s / 2 slope), x + s (v + s (a / 2 + s / 6 slope)), and the lag's.
+                for c in range(3):
+                    now, rise = a[i, c], a[i + 1, c] - a[i, c]
+                    y = of_v * (v[i, c] + s * (now + half * per_s * rise))
+                    if of_x != 0.0:
+                        y += of_x * (x[i, c] + s * (v[i, c] + s * (0.5 * now + sixth * rise)))
+                    out[one, k, c] += y
+                if of_z != 0.0:
+                    kept = np.exp(-s / lag)
+                    for c in range(3):
+                        slope = per_s * (a[i + 1, c] - a[i, c])
+                        behind = kept * z[i, c] + (1.0 - kept) * (a[i, c] - lag * slope)
+                        out[one, k, c] += of_z * (behind + slope * s)
+            j += 1
 
 
-@compiled("void(f8[:,:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[:,:,::1], f8[:,:,::1])")
+@compiled("void(f8[:,:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[:,:,:], f8[:,:,:])")
 def integrals(P: Array, weight: Array, to_end: Array, x: Array, one: Array, two: Array) -> None:
-    """``sum weight P x`` and ``sum to_end P x`` over nodes, into (K, 3, m) that are zero.
+    """``sum weight P x`` and ``sum to_end P x`` over nodes, into (K, 3, m).
 
     Args:
         P: (K, M + 1, 3, 3) body axes of the node to those of the interval's start.
@@ -60,19 +102,77 @@ def integrals(P: Array, weight: Array, to_end: Array, x: Array, one: Array, two:
     """
     K, M1, _, m = x.shape
     for k in range(K):
-        for i in range(M1):
-            a, b = weight[k, i], to_end[k, i]
-            for r in range(3):
-                u, v, w = P[k, i, r, 0], P[k, i, r, 1], P[k, i, r, 2]
-                for c in range(m):
-                    turned = u * x[k, i, 0, c] + v * x[k, i, 1, c] + w * x[k, i, 2, c]
-                    one[k, r, c] += a * turned
-                    two[k, r, c] += b * turned
+        for c in range(m):
+            a0 = a1 = a2 = b0 = b1 = b2 = 0.0
+            for i in range(M1):
+                a, b = weight[k, i], to_end[k, i]
+                x0, x1, x2 = x[k, i, 0, c], x[k, i, 1, c], x[k, i, 2, c]
+                y0 = P[k, i, 0, 0] * x0 + P[k, i, 0, 1] * x1 + P[k, i, 0, 2] * x2
+                y1 = P[k, i, 1, 0] * x0 + P[k, i, 1, 1] * x1 + P[k, i, 1, 2] * x2
+                y2 = P[k, i, 2, 0] * x0 + P[k, i, 2, 1] * x1 + P[k, i, 2, 2] * x2
+                a0, a1, a2 = a0 + a * y0, a1 + a * y1, a2 + a * y2
+                b0, b1, b2 = b0 + b * y0, b1 + b * y1, b2 + b * y2
+            one[k, 0, c], one[k, 1, c], one[k, 2, c] = a0, a1, a2
+            two[k, 0, c], two[k, 1, c], two[k, 2, c] = b0, b1, b2
+
+
+OWN = 11
+"""Columns of :func:`own`: force, axes, raw force by axis, force that a rate turns, rate by axis."""
 
 
 @compiled(
-    "void(f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], "
-    "f8[:,:,::1], f8[:,:,::1])"
+    "void(f8[:,:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1],"
+    " f8[:,:,:,::1])"
+)
+def own(
+    P: Array,
+    weight: Array,
+    to_end: Array,
+    w_b: Array,
+    raw_s: Array,
+    f_b: Array,
+    R_bs: Array,
+    out: Array,
+) -> None:
+    """:func:`integrals` of what every model asks of the sensors, without storing it at each node.
+
+    Args:
+        P: as of :func:`integrals`.
+        weight: see there.
+        to_end: see there.
+        w_b: (K, M + 1, 3) rad/s.
+        raw_s: (K, M + 1, 3) m/s^2.
+        f_b: (K, M + 1, 3) m/s^2.
+        R_bs: (3, 3) board orientation.
+        out: (K, 2, 3, OWN) zero; written to.
+    """
+    K, M1 = weight.shape
+    for k in range(K):
+        for i in range(M1):
+            f0, f1, f2 = f_b[k, i, 0], f_b[k, i, 1], f_b[k, i, 2]
+            w0, w1, w2 = w_b[k, i, 0], w_b[k, i, 1], w_b[k, i, 2]
+            t0, t1, t2 = w1 * f2 - w2 * f1, w2 * f0 - w0 * f2, w0 * f1 - w1 * f0
+            for r in range(3):
+                x, y, z = P[k, i, r, 0], P[k, i, r, 1], P[k, i, r, 2]
+                for j, weighs in ((0, weight[k, i]), (1, to_end[k, i])):
+                    u, v, w = weighs * x, weighs * y, weighs * z
+                    row = out[k, j, r]
+                    row[0] += u * f0 + v * f1 + w * f2
+                    row[1] += u
+                    row[2] += v
+                    row[3] += w
+                    for c in range(3):
+                        across = u * R_bs[0, c] + v * R_bs[1, c] + w * R_bs[2, c]
+                        row[4 + c] += across * raw_s[k, i, c]
+                    row[7] += u * t0 + v * t1 + w * t2
+                    row[8] += u * w0
+                    row[9] += v * w1
+                    row[10] += w * w2
+
+
+@compiled(
+    "void(f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,:], "
+    "f8[:,:,:])"
 )
 def spread(
     R: Array,
@@ -81,11 +181,10 @@ def spread(
     velocity: Array,
     place: Array,
     x: Array,
-    turned: Array,
     one: Array,
     two: Array,
 ) -> None:
-    """``R_epoch^T sum velocity R x`` and ``R_epoch^T sum place R x``, into (K, 3, m) that are zero.
+    """``R_epoch^T sum velocity R x`` and ``R_epoch^T sum place R x``, into (K, 3, m).
 
     Args:
         R: (n, 3, 3) body axes of the nodes to those that do not turn.
@@ -94,29 +193,27 @@ def spread(
         velocity: (K, b) weights of that and the next.
         place: (K, b).
         x: (n, 3, m).
-        turned: (n, 3, m), for what is in between.
         one: written to.
         two: written to.
     """
     n, _, m = x.shape
     K, b = velocity.shape
+    turned = np.empty((n, m, 3))
     for i in range(n):
-        for r in range(3):
-            for c in range(m):
-                turned[i, r, c] = (
+        for c in range(m):
+            for r in range(3):
+                turned[i, c, r] = (
                     R[i, r, 0] * x[i, 0, c] + R[i, r, 1] * x[i, 1, c] + R[i, r, 2] * x[i, 2, c]
                 )
     for k in range(K):
-        for j in range(max(0, -first[k]), min(b, n - first[k])):
-            v, p, i = velocity[k, j], place[k, j], first[k] + j
+        begin, end = max(0, -first[k]), min(b, n - first[k])
+        for c in range(m):
+            a0 = a1 = a2 = b0 = b1 = b2 = 0.0
+            for j in range(begin, end):
+                v, p, y = velocity[k, j], place[k, j], turned[first[k] + j, c]
+                a0, a1, a2 = a0 + v * y[0], a1 + v * y[1], a2 + v * y[2]
+                b0, b1, b2 = b0 + p * y[0], b1 + p * y[1], b2 + p * y[2]
             for r in range(3):
-                for c in range(m):
-                    one[k, r, c] += v * turned[i, r, c]
-                    two[k, r, c] += p * turned[i, r, c]
-        for both in (one, two):
-            for c in range(m):
-                x0, x1, x2 = both[k, 0, c], both[k, 1, c], both[k, 2, c]
-                for r in range(3):
-                    both[k, r, c] = (
-                        R_epoch[k, 0, r] * x0 + R_epoch[k, 1, r] * x1 + R_epoch[k, 2, r] * x2
-                    )
+                x0, x1, x2 = R_epoch[k, 0, r], R_epoch[k, 1, r], R_epoch[k, 2, r]
+                one[k, r, c] = x0 * a0 + x1 * a1 + x2 * a2
+                two[k, r, c] = x0 * b0 + x1 * b1 + x2 * b2

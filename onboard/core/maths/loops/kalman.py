@@ -13,10 +13,12 @@ def moved(rows: Array, x: Array, gained: Array) -> None:
     """``x += F x`` of x (s, m), F having these first rows (r, s); by way of ``gained`` (r, m)."""
     for a in range(rows.shape[0]):
         for c in range(x.shape[1]):
-            total = 0.0
-            for k in range(x.shape[0]):
-                total += rows[a, k] * x[k, c]
-            gained[a, c] = total
+            gained[a, c] = 0.0
+        for k in range(x.shape[0]):
+            share = rows[a, k]
+            if share != 0.0:  # few states move another one
+                for c in range(x.shape[1]):
+                    gained[a, c] += share * x[k, c]
     for a in range(rows.shape[0]):
         for c in range(x.shape[1]):
             x[a, c] += gained[a, c]
@@ -39,7 +41,7 @@ def kalman_errors(
     """:func:`onboard.core.maths.kalman_errors.kalman_errors`, one measurement after the other."""
     n, r, s = moves.shape
     m = x.shape[1]
-    gain, gained = np.empty(s), np.empty((r, max(s, m)))
+    gain, off, gained = np.empty(s), np.empty(m), np.empty((r, max(s, m)))
     for i in range(n):
         moved(moves[i], x, gained)
         moved(moves[i], P, gained)
@@ -55,13 +57,12 @@ def kalman_errors(
             for a in range(s):
                 gain[a] = P[a, seen] / spread
             for c in range(m):
-                off = x[seen, c]
-                for a in range(s):
-                    x[a, c] -= gain[a] * off
-            for c in range(s):
-                row = gain[c] * spread
-                for a in range(s):
-                    P[a, c] -= gain[a] * row
+                off[c] = x[seen, c]
+            for a in range(s):
+                for c in range(m):
+                    x[a, c] -= gain[a] * off[c]
+                for c in range(s):
+                    P[a, c] -= gain[a] * (gain[c] * spread)
         for a in range(s):
             for c in range(a):
                 P[a, c] = P[c, a]

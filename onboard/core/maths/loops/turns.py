@@ -1,4 +1,4 @@
-"""Turns in a row, and an attitude between its samples as the gyroscope turns.
+"""Turns by the gyroscope, and an attitude between its samples as they go.
 
 numba notices changes of this file alone: whoever changes ``place`` of the curves has to touch it.
 """
@@ -6,10 +6,11 @@ numba notices changes of this file alone: whoever changes ``place`` of the curve
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Vector3
 from onboard.core.maths.compiler import compiled, part
 from onboard.core.maths.loops.curves import place
 
@@ -17,54 +18,55 @@ NO_TURN = 1e-12
 """Sine of half an angle below which a rotation vector is twice the quaternion's [bound: to
 rounding]."""
 
+SMALL_HALF = 1e-3
+"""Square of half an angle, rad^2, below which four terms of sine and cosine are all of them [bound:
+to rounding; the fifth is 3e-17 of one]."""
+
+
+Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+"""A (3, 3) matrix, row by row, as loops that follow one turn after the other keep it."""
+
 
 @part
-def turned_by(x: float, y: float, z: float, R: Array) -> None:
-    """Rotation by a vector, rad, into (3, 3), by way of the unit quaternion."""
-    angle = math.sqrt(x * x + y * y + z * z)
-    factor = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    w = 2.0 * math.cos(0.5 * angle)
+def turn_by(x: float, y: float, z: float) -> Nine:
+    """Rotation by a vector, rad, by way of the unit quaternion."""
+    square = 0.25 * (x * x + y * y + z * z)
+    if square < SMALL_HALF:
+        # Between nodes nearly all are so small, and sine and cosine are most of what a turn costs.
+        factor = 0.5 - square / 12.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))
+        w = 2.0 - square * (1.0 - square / 12.0 * (1.0 - square / 30.0))
+    else:
+        half = math.sqrt(square)
+        factor, w = 0.5 * math.sin(half) / half, 2.0 * math.cos(half)
     x, y, z = factor * x, factor * y, factor * z
     xx, yy, zz = 2.0 * x * x, 2.0 * y * y, 2.0 * z * z
     xy, xz, yz = 2.0 * x * y, 2.0 * x * z, 2.0 * y * z
-    R[0, 0], R[0, 1], R[0, 2] = 1.0 - yy - zz, xy - w * z, xz + w * y
-    R[1, 0], R[1, 1], R[1, 2] = xy + w * z, 1.0 - xx - zz, yz - w * x
-    R[2, 0], R[2, 1], R[2, 2] = xz - w * y, yz + w * x, 1.0 - xx - yy
+    return (
+        *(1.0 - yy - zz, xy - w * z, xz + w * y),
+        *(xy + w * z, 1.0 - xx - zz, yz - w * x),
+        *(xz - w * y, yz + w * x, 1.0 - xx - yy),
+    )
 
 
 @part
-def product(A: Array, B: Array, out: Array) -> None:
-    """``A B`` of (3, 3) matrices, into another one."""
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j]
+def turned(A: Array, turn: Nine, out: Array) -> None:
+    """A (3, 3) matrix times another one, into a third, which may be the first."""
+    for r in range(3):
+        a, b, c = A[r, 0], A[r, 1], A[r, 2]
+        out[r, 0] = a * turn[0] + b * turn[3] + c * turn[6]
+        out[r, 1] = a * turn[1] + b * turn[4] + c * turn[7]
+        out[r, 2] = a * turn[2] + b * turn[5] + c * turn[8]
 
 
-@compiled("void(f8[:,:,::1], f8[::1], f8[:,:,:,::1])")
-def turns_in_a_row(w: Array, h: Array, P: Array) -> None:
-    """Attitude at nodes against that of the first, into (K, M + 1, 3, 3).
-
-    Args:
-        w: (K, 2 M + 1, 3) rates at the nodes and half-way between them, rad/s.
-        h: (K,) from node to node, s.
-        P: written to.
-    """
-    K, M1 = P.shape[:2]
-    turn = np.empty((3, 3))
-    for k in range(K):
-        sixth, twelfth = h[k] / 6.0, h[k] * h[k] / 12.0
-        for r in range(3):
-            for c in range(3):
-                P[k, 0, r, c] = 1.0 if r == c else 0.0
-        for i in range(M1 - 1):
-            a, m, b = w[k, 2 * i], w[k, 2 * i + 1], w[k, 2 * i + 2]
-            turned_by(
-                sixth * (a[0] + 4.0 * m[0] + b[0]) + twelfth * (a[1] * b[2] - a[2] * b[1]),
-                sixth * (a[1] + 4.0 * m[1] + b[1]) + twelfth * (a[2] * b[0] - a[0] * b[2]),
-                sixth * (a[2] + 4.0 * m[2] + b[2]) + twelfth * (a[0] * b[1] - a[1] * b[0]),
-                turn,
-            )
-            product(P[k, i], turn, P[k, i + 1])
+@part
+def turn_between(a: Vector3, m: Vector3, b: Vector3, h: float) -> Nine:
+    """Rotation by rates at both ends and half-way of a time ``h``, s."""
+    sixth, twelfth = h / 6.0, h * h / 12.0
+    return turn_by(
+        sixth * (a[0] + 4.0 * m[0] + b[0]) + twelfth * (a[1] * b[2] - a[2] * b[1]),
+        sixth * (a[1] + 4.0 * m[1] + b[1]) + twelfth * (a[2] * b[0] - a[0] * b[2]),
+        sixth * (a[2] + 4.0 * m[2] + b[2]) + twelfth * (a[0] * b[1] - a[1] * b[0]),
+    )
 
 
 @part
@@ -80,7 +82,7 @@ def _gyro_turn(
 ) -> int:
     """Rotation by the gyroscope between two times, in parts, into (3, 3); where it looked."""
     h = (until - since) / parts
-    turn, before = np.empty((3, 3)), np.empty((3, 3))
+    R[:] = np.eye(3)
     i = near
     for p in range(parts):
         at = since - delay + h * (p + 0.5)
@@ -89,12 +91,7 @@ def _gyro_turn(
         x = ((powers[i, 3, 0] * u + powers[i, 2, 0]) * u + powers[i, 1, 0]) * u + powers[i, 0, 0]
         y = ((powers[i, 3, 1] * u + powers[i, 2, 1]) * u + powers[i, 1, 1]) * u + powers[i, 0, 1]
         z = ((powers[i, 3, 2] * u + powers[i, 2, 2]) * u + powers[i, 1, 2]) * u + powers[i, 0, 2]
-        turned_by(x * h, y * h, z * h, turn)
-        if p == 0:
-            R[:] = turn
-        else:
-            before[:] = R
-            product(before, turn, R)
+        turned(R, turn_by(x * h, y * h, z * h), R)
     return i
 
 
@@ -172,6 +169,11 @@ def attitudes(
             known = k
         i = _gyro_turn(t, powers, t_k[k], at[m], delay, parts, i, turn)
         share = (at[m] - t_k[k]) / (t_k[k + 1] - t_k[k])
-        turned_by(share * missed[0], share * missed[1], share * missed[2], A)
-        product(turn, A, B)
-        product(R_k[k], B, out[m])
+        turned(turn, turn_by(share * missed[0], share * missed[1], share * missed[2]), turn)
+        for r in range(3):
+            for c in range(3):
+                out[m, r, c] = (
+                    R_k[k, r, 0] * turn[0, c]
+                    + R_k[k, r, 1] * turn[1, c]
+                    + R_k[k, r, 2] * turn[2, c]
+                )

@@ -127,7 +127,9 @@ def _averaged(t: Array, f_b: Array) -> Array:
         beside = min(math.ceil(0.5 * ((noise[j] / MOST_NOISE) ** 2 - 1.0)), most)
         if beside > 0:
             # Turned about its ends, a straight line goes on straight.
-            padded = np.pad(f_b[:, j], beside, mode="reflect", reflect_type="odd")
+            x = f_b[:, j]
+            before = 2.0 * x[0] - x[beside:0:-1]
+            padded = np.concatenate([before, x, 2.0 * x[-1] - x[-2 : -beside - 2 : -1]])
             count = 2 * beside + 1
             out[:, j] = np.convolve(padded, np.full(count, 1.0 / count), mode="valid")
     return out

@@ -60,8 +60,7 @@ class GpsOvershoot(Effect):
 
     def velocity(self, around: Around) -> Direct:
         """What the loops add to the velocity, by size and shape."""
-        changes = around.past.changes(self._before)
-        return Direct(body=np.einsum("un,nki->kiu", self._weights, changes))
+        return Direct(body=around.past.changes(self._before, self._weights))
 
 
 def _weights() -> tuple[Array, Array]:

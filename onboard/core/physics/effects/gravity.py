@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.model.quadrature import Signals
+from onboard.core.model.quadrature import Intervals, OfSensors, Signals
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import Bearing, Effect
 from onboard.core.physics.finding import Finding
@@ -35,14 +35,26 @@ class Gravity(Effect):
     def acceleration(self, nodes: Signals) -> Array:
         """Down, in body axes by the recorded attitude, and by the gyroscope from there on."""
         if nodes.P is not None:
-            R_nb, _ = nodes.segment.attitude_at(nodes.t[:, 0])
-            turned: Array = np.einsum("ka,kmab->kmb", R_nb[:, 2], nodes.P)
+            turned: Array = np.einsum("ka,kmab->kmb", _down(nodes), nodes.P)
             return turned[..., None]
         flat, _ = nodes.segment.attitude_at(nodes.t.ravel())
         down = flat[:, 2, :].reshape(*nodes.t.shape, 3)
         return down[..., None]
 
+    def gained(self, intervals: Intervals, of: OfSensors) -> Array:  # noqa: ARG002
+        """Of :meth:`acceleration`, which in the axes of an interval's start stands still."""
+        time = np.stack([intervals.weight.sum(axis=1), intervals.weight_to_end.sum(axis=1)], axis=1)
+        out: Array = (time[..., None] * _down(intervals.signals)[:, None])[..., None]
+        return out
+
     @classmethod
     def size(cls, found: Finding) -> str:
         """``by 0.03 ± 0.005 m/s²``."""
         return f"by {measured(first(found.unknowns), 1.0, 'm/s²')}"
+
+
+def _down(nodes: Signals) -> Array:
+    """(K, 3) down at the first of nodes in rows, body axes."""
+    R_nb, _ = nodes.segment.attitude_at(nodes.t[:, 0])
+    down: Array = R_nb[:, 2]
+    return down

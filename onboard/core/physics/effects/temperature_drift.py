@@ -19,7 +19,6 @@ from onboard.core.physics.effect import (
     Bearing,
     Effect,
     Origin,
-    on_axes,
 )
 from onboard.core.physics.finding import Finding, ResponseCurve
 from onboard.core.physics.wording import fixed
@@ -102,7 +101,11 @@ class TemperatureDrift(Effect):
         T = nodes.slow("temperature")
         if T is None:
             return np.zeros((*nodes.t.shape, 3, len(self.unknowns)))
-        return np.concatenate([on_axes(p[..., None]) for p in self._powers(T)], axis=-1)
+        powers = -np.stack(self._powers(T), axis=-1)
+        out = np.zeros((*T.shape, len(AXES), powers.shape[-1], len(AXES)))
+        for axis in range(len(AXES)):
+            out[..., axis, :, axis] = powers
+        return out.reshape(*T.shape, len(AXES), -1)
 
     def _powers(self, T: Array) -> list[Array]:
         """What one of each adds to an offset at temperatures of any shape, power by power."""
@@ -110,7 +113,8 @@ class TemperatureDrift(Effect):
         if self.shaped:
             low, high = self.flown
             u = np.clip((2.0 * T - low - high) / (high - low), -1.0, 1.0)
-            out += [0.5 * (3.0 * u**2 - 1.0), 0.5 * (5.0 * u**3 - 3.0 * u)]
+            square = u * u
+            out += [0.5 * (3.0 * square - 1.0), 0.5 * u * (5.0 * square - 3.0)]
         return out[: len(self.unknowns) // len(AXES)]
 
     def bent(self, line: ResponseCurve, theta: Array, covariance: Array) -> ResponseCurve:
