@@ -261,8 +261,7 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask) -> Array
 
     The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).
     Each unknown has its own, but none less than the mean of all: a few blocks know single ones
-    badly.  Of few blocks a variance is known badly, too: what is told by it is as wide as Student's
-    t of their freedom.  Errors of one flight go together (its sensors, its load, how well its wind was
+    badly.  Errors of one flight go together (its sensors, its load, how well its wind was
     measured), and flights that contradict each other do not show it from block to block: where
     there are enough of them, their scores' scatter counts, too, if it is the larger.  The scores of
     what is ``held`` (m,) at its bound have a mean, which is no scatter.
@@ -283,9 +282,7 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask) -> Array
         clusters = every - np.where(held, np.mean(every, axis=0), 0.0)
         if count < FEWEST_BLOCKS:
             continue
-        # The variance of Student's t, over the square of its scale.
-        wide = (count - 1.0) / (count - 3.0)
-        robust = wide * inverse @ (clusters.T @ clusters) @ inverse * count / (count - 1.0)
+        robust = inverse @ (clusters.T @ clusters) @ inverse * count / (count - 1.0)
         ratio = np.diag(robust) / np.maximum(known, 1e-300)
         mean = float(np.mean(ratio[told])) if told.any() and by_block else 1.0
         out = np.maximum(out, np.maximum(ratio, mean))
