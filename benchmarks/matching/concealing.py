@@ -80,6 +80,7 @@ class Secret:
     kind: Kind
     names: tuple[str, ...] = ()
     level: Level = "large"
+    lasting_s: tuple[float, float] = DURATION_S
 
     @property
     def wanted(self) -> set[str]:
@@ -107,7 +108,7 @@ class Secret:
         """
         draw, slower = divmod(attempt, ATTEMPTS)
         rng = np.random.default_rng([self.seed, 983, draw] if draw else [self.seed, 983])
-        duration = float(rng.uniform(*DURATION_S))
+        duration = float(rng.uniform(*self.lasting_s))
         imu = ImuTruth(
             scale=_three(1.0 + RESIDUAL_SCALE * rng.standard_normal(3)),
             offset=_three(RESIDUAL_OFFSET * rng.standard_normal(3)),

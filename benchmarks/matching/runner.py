@@ -13,6 +13,7 @@ import struct
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +122,9 @@ def main(arguments: list[str] | None = None) -> None:
     options.add_argument("--gusts", action="store_true", help="planes in turbulence alone")
     options.add_argument("--payloads", action="store_true", help="copters that drop one alone")
     options.add_argument("--all", action="store_true", help="say what was said of each")
+    options.add_argument(
+        "--seconds", nargs=2, type=float, help="of each flight, from the launch: least and most"
+    )
     chosen = options.parse_args(arguments)
     secrets = Challenge(chosen.first).secrets()
     if chosen.gusts:
@@ -133,6 +137,9 @@ def main(arguments: list[str] | None = None) -> None:
         beside = {"turbulence"} if chosen.gusts else set()
         secrets = [s for s in secrets if set(s.names) == beside | {chosen.name}]
     secrets = secrets[: chosen.count or len(secrets)]
+    if chosen.seconds:
+        least, most = chosen.seconds
+        secrets = [replace(s, lasting_s=(least, most)) for s in secrets]
 
     def tell(o: Outcome) -> str:
         missed = o.secret.testable and not o.identified

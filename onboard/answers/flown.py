@@ -45,7 +45,7 @@ from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans, joined, lasting_height, scatter_near
 from onboard.core.vehicle.touches import touched_spans
-from onboard.core.vehicle.trajectory import Sensors
+from onboard.core.vehicle.trajectory import UNKNOWN_TILT, Sensors
 from onboard.recordings.recording import Recording
 
 FASTEST_HZ: Final = 100.0
@@ -306,14 +306,15 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
     """
     c = diagnosis.calibration
     timing = {name: e.value for name, e in diagnosis.timing.items() if math.isfinite(e.value)}
-    misread, tilt = None, np.zeros(3)
+    misread, turned = None, None
     if diagnosis.silent or engine is None:
         scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
         sigma = np.full(3, UNKNOWN_FORCE)
     else:
         scale, offset = np.array(c.scale), np.array(c.offset)
         sigma = _force_sigma(engine)
-        misread, tilt = misread_of(engine), attitude_error(engine)
+        misread, turned = misread_of(engine), attitude_error(engine)
+    tilt, tilt_sigma = turned or (np.zeros(3), UNKNOWN_TILT)
     return Sensors(
         scale,
         offset,
@@ -324,6 +325,7 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
         np.array([g.value for g in c.gyro_scale]),
         misread,
         tilt,
+        tilt_sigma,
     )
 
 

@@ -56,14 +56,19 @@ class Misread:
         return out, segment
 
 
-def attitude_error(engine: Engine) -> Array:
-    """(3,) roll and pitch of the body, and heading, by which the recorded attitude is off, rad."""
+def attitude_error(engine: Engine) -> tuple[Array, Array] | None:
+    """By which the recorded attitude is off all flight long, and how surely; None without sums.
+
+    Returns:
+        (3,) roll and pitch of the body, and heading, rad, and (3,) their sigmas.
+    """
     solution, index = engine.solution(), engine.model.index
     if solution is None:
-        return np.zeros(3)
-    out: Array = solution.theta[[index[n] for n in ("tilt_roll", "tilt_pitch", "heading")]]
-    out[2] += engine.point.heading
-    return out
+        return None
+    places = [index[n] for n in ("tilt_roll", "tilt_pitch", "heading")]
+    off = solution.theta[places]
+    off[2] += engine.point.heading
+    return off, np.sqrt(np.diag(solution.covariance)[places])
 
 
 def misread_of(engine: Engine) -> Misread | None:

@@ -22,6 +22,8 @@ class Air:
         wind_n: (n, 3) towards north, east, down, m/s.
         gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
         gust_variance: of the air along each axis, m^2/s^2; one, or (n,).
+        turned_n: (n, 3) by which the recorded attitude is turned too far, about north, east and
+            down, rad; None where it is right.
         through: (n,) flow through the rotors beside that of the velocity through the air, m/s.
         tilt: of the thrust forward and to the right, rad.
         rho: (n,) density, kg/m^3.
@@ -47,6 +49,7 @@ class Air:
             self.wind_n[:, :2] += np.nan_to_num(flight.measured_wind[:, :2])
         self.gust_n = np.zeros(3)
         self.gust_variance: Array | float = 0.0
+        self.turned_n: Array | None = None
         self.through: Array | float = 0.0
         self.tilt = (0.0, 0.0)
         self.rho = flight.rho
@@ -78,6 +81,9 @@ class Air:
         if self._u_b is None:
             moved = np.einsum("nij,nj->ni", self.flight.R_bn, self.wind_n + self.gust_n)
             self._u_b = self.flight.v_b - moved
+            if self.turned_n is not None:
+                about = np.einsum("nij,nj->ni", self.flight.R_bn, self.turned_n)
+                self._u_b = self._u_b + np.cross(about, self._u_b)
         return self._u_b
 
     @property

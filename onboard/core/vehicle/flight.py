@@ -61,7 +61,7 @@ class Flight:
         airspeed: (n,) as reported; NaN where there is none.
         ekf_wind: (n, 2) or empty (n, 0).
         velocity_sigma: of the velocity, m/s.
-        attitude_sigma: of roll and pitch, rad.
+        attitude_sigma: (3,) of the attitude, about north, east and down, rad.
         measured_wind: (n, 3) towards north and east, and its sigma, m/s; or empty (n, 0).
         part: (n,) which of several recordings a step is of (:mod:`onboard.core.vehicle.several`).
         rest_volts: of the battery before the flight began, V; NaN where nobody saw it.
@@ -88,7 +88,7 @@ class Flight:
     airspeed: Array
     ekf_wind: Array
     velocity_sigma: float
-    attitude_sigma: float
+    attitude_sigma: Array
     measured_wind: Array = field(default_factory=lambda: np.zeros((0, 0)))
     part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     rest_volts: float = math.nan
@@ -205,7 +205,7 @@ def flight_of(
         ground=ground,
         ground_seen=bool(grounded),
         velocity_sigma=max(m.velocity_sigma for m in pieces),
-        attitude_sigma=max(m.attitude_sigma for m in pieces),
+        attitude_sigma=np.max([m.attitude_sigma for m in pieces], axis=0),
         piece=joined["piece"].astype(np.int64),
         t=joined["t"],
         f_b=joined["f_b"],

@@ -10,6 +10,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import COLUMN, AirspeedScale
+from onboard.core.vehicle.effects.attitude_error import AttitudeError
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.beyond_wings import WINGS
 from onboard.core.vehicle.effects.drag import Drag
@@ -133,6 +134,7 @@ def plane_model(
         *([WindByHeight(flight)] if HEIGHT in beyond else []),
         own([WindProfile() for _ in range(flight.parts)]),
         *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),
+        own([AttitudeError(flight.attitude_sigma, s) for s in np.atleast_2d(force_sigma)]),
         ServoLag(),
         Lift(frame),
         Drag(frame),

@@ -65,7 +65,7 @@ def joined(flights: Sequence[Flight]) -> Flight:
         first,
         **whole,
         velocity_sigma=max(f.velocity_sigma for f in flights),
-        attitude_sigma=max(f.attitude_sigma for f in flights),
+        attitude_sigma=np.max([f.attitude_sigma for f in flights], axis=0),
         rest_volts=float(np.fmax.reduce([_highest_volts(f) for f in laid])),
         ground_seen=all(f.ground_seen for f in flights),
         history=history,

@@ -9,7 +9,7 @@ is taken off.  H. E. Rauch, F. Tung and C. T. Striebel, AIAA Journal 3 (1965).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -20,13 +20,15 @@ from onboard.core.maths.frames import skew
 
 V, PSI, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)
 STATES: Final = 9
-START: Final = np.diag([1.0] * 3 + [0.03] * 3 + [0.01] * 3) ** 2
+START: Final = np.array([1.0] * 3 + [0.03] * 3 + [0.01] * 3)
 """Standard deviations at the beginning: m/s, rad, rad/s [physics]."""
 BIAS_WALK: Final = 2e-5
 """Wander of a gyroscope's bias, rad/s per sqrt(s) [data sheet]."""
 LOOSE_RAD: Final = 0.25
 """What the recorded attitude is believed to at each fix, rad: two degrees over ten seconds, so that
 a heading that nothing shows does not wander off [physics]."""
+NOT_RAD: Final = 1e3
+"""The same of one that is not believed again [cost]."""
 FORCE_WALK: Final = 0.01
 """Noise of the specific force, m/s^2 per sqrt(Hz) [data sheet]."""
 
@@ -58,10 +60,17 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Noise: of the attitude (rad per sqrt(s)) and of the receiver's velocity (m/s)."""
+    """Noise.
+
+    Attributes:
+        attitude: of the gyroscope's attitude, rad per sqrt(s).
+        velocity: of the receiver's velocity, m/s.
+        recorded: what the recorded attitude is believed to at each fix, rad.
+    """
 
     attitude: float
     velocity: float
+    recorded: float = LOOSE_RAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +90,13 @@ class _Filtered:
     moves: Array
 
 
-def likelihoods(steps: Steps, levels: Sequence[Levels]) -> Array:
-    """(j,) logarithm of the likelihood of what was measured, by each of the levels at once."""
+def likelihoods(steps: Steps, levels: Sequence[Levels], attitude: Array = START[PSI]) -> Array:
+    """(j,) logarithm of the likelihood of what was measured, by each of the levels at once.
+
+    ``attitude`` as in :func:`smoothed`.
+    """
     j, n = len(levels), len(steps.dt)
-    m, P, score = np.zeros((j, STATES)), np.tile(START, (j, 1, 1)), np.zeros(j)
+    m, P, score = np.zeros((j, STATES)), np.tile(_start(attitude), (j, 1, 1)), np.zeros(j)
     first = np.flatnonzero(np.isfinite(steps.measured).all(axis=1))
     if len(first):
         m[:, V] = steps.measured[first[0]]
@@ -110,9 +122,16 @@ def likelihoods(steps: Steps, levels: Sequence[Levels]) -> Array:
     return score
 
 
-def smoothed(steps: Steps, levels: Levels) -> Smoothed:
-    """Errors by everything that was measured before and after."""
-    f = _filtered(steps, levels)
+def smoothed(steps: Steps, levels: Levels, attitude: Array = START[PSI]) -> Smoothed:
+    """Errors by everything that was measured before and after.
+
+    Args:
+        steps: from fix to fix.
+        levels: of the noise.
+        attitude: (3,) how well the recorded one is known at the beginning, about north, east and
+            down, rad.
+    """
+    f = _filtered(steps, levels, _start(attitude))
     n = len(steps.dt)
     x, P = f.means.copy(), f.covariances[-1]
     variance = np.diag(P).copy()
@@ -124,6 +143,23 @@ def smoothed(steps: Steps, levels: Levels) -> Smoothed:
     return Smoothed(x, np.sqrt(np.maximum(variance / n, 0.0)))
 
 
+def attitude_known(steps: Steps, levels: Levels, attitude: Array) -> Array:
+    """(3,) how well the attitude is known on the whole, rad; arguments as of :func:`smoothed`.
+
+    By the motion, or as well as at the beginning: what the recorded one is off by all flight long
+    is off at every fix, and asking it again and again tells nothing.
+    """
+    by_motion = smoothed(steps, replace(levels, recorded=NOT_RAD), attitude).sigma[PSI]
+    return np.minimum(by_motion, attitude)
+
+
+def _start(attitude: Array) -> Array:
+    """(9, 9) covariance at the beginning."""
+    sigma = START.copy()
+    sigma[PSI] = attitude
+    return np.diag(sigma**2)
+
+
 def _rate(levels: Levels) -> Array:
     """(9,) growth of the variances by time."""
     return np.array([FORCE_WALK**2] * 3 + [levels.attitude**2] * 3 + [BIAS_WALK**2] * 3)
@@ -131,7 +167,7 @@ def _rate(levels: Levels) -> Array:
 
 def _noise(levels: Levels) -> Array:
     """(6, 6) covariance of velocity and attitude as they are measured."""
-    return np.diag([levels.velocity**2] * 3 + [LOOSE_RAD**2] * 3)
+    return np.diag([levels.velocity**2] * 3 + [levels.recorded**2] * 3)
 
 
 def _seen(measured: Array) -> NDArray[np.intp]:
@@ -153,9 +189,9 @@ def _moves(steps: Steps) -> tuple[Array, Array]:
     return moves, kicks
 
 
-def _filtered(steps: Steps, levels: Levels) -> _Filtered:
+def _filtered(steps: Steps, levels: Levels, start: Array) -> _Filtered:
     n = len(steps.dt)
-    m, P = np.zeros(STATES), START.copy()
+    m, P = np.zeros(STATES), start
     first = np.flatnonzero(np.isfinite(steps.measured).all(axis=1))
     if len(first):
         m[V] = steps.measured[first[0]]

@@ -30,9 +30,14 @@ from onboard.core.vehicle.smoother import (
     Levels,
     Steps,
     V,
+    attitude_known,
     likelihoods,
     smoothed,
 )
+
+UNKNOWN_TILT = np.array([0.03, 0.03, 0.05])
+"""What an autopilot's roll, pitch and heading are good to where nobody has looked, rad: a compass
+is, to three degrees [data sheet]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,7 @@ class Sensors:
         misread: what the accelerometer reads wrong beside these; None: nothing that is known.
         tilt: (3,) roll and pitch of the body by which the recorded attitude is turned too far, and
             heading to north, rad.
+        tilt_sigma: (3,) of that, rad.
     """
 
     scale: Array
@@ -61,6 +67,7 @@ class Sensors:
     gyro_scale: Array = field(default_factory=lambda: np.zeros(3))
     misread: Misread | None = None
     tilt: Array = field(default_factory=lambda: np.zeros(3))
+    tilt_sigma: Array = field(default_factory=UNKNOWN_TILT.copy)
 
     def attitude(self, R_nb: Array) -> Array:
         """Recorded attitudes (n, 3, 3) without what they are off by all flight long."""
@@ -98,7 +105,7 @@ class Motion:
         v_n: (n, 3) velocity, m/s.
         height: (n,) above mean sea level, m.
         velocity_sigma: of the velocity, m/s.
-        attitude_sigma: of roll and pitch, rad.
+        attitude_sigma: (3,) of the attitude, about north, east and down, rad.
         fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
             force and recorded attitude, m/s, but for a constant.
     """
@@ -110,7 +117,7 @@ class Motion:
     v_n: Array
     height: Array
     velocity_sigma: float
-    attitude_sigma: float
+    attitude_sigma: Array
     fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
 
     def finer(self, step_s: float) -> Motion:
@@ -181,7 +188,10 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     # What the receiver averages over is averaged here, too: two points have the same variance.
     average = 0.5 * (_at(true_t + half, t, v_n) + _at(true_t - half, t, v_n))
     steps = _steps(true_t, t, f_n, w_b, R, fix_v - average)
-    errors = smoothed(steps, _levels(steps))
+    level = float(np.max(sensors.tilt_sigma[:2]))
+    start = np.array([level, level, float(sensors.tilt_sigma[2])])
+    levels = _levels(steps, start)
+    errors = smoothed(steps, levels, start)
     v_n = v_n + _at(t, true_t, errors.x[:, V])
     R = rotation_from_vector(_at(t, true_t, errors.x[:, PSI])) @ R
     return Motion(
@@ -192,7 +202,7 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         v_n,
         np.interp(t, true_t, fix_h),
         float(np.max(errors.sigma[V])),
-        float(np.max(errors.sigma[PSI][:2])),
+        attitude_known(steps, levels, start),
         (true_t, fix_v - average),
     )
 
@@ -217,11 +227,11 @@ def _steps(at: Array, t: Array, f_n: Array, w_b: Array, R: Array, measured: Arra
     )
 
 
-def _levels(steps: Steps) -> Levels:
+def _levels(steps: Steps, start: Array) -> Levels:
     """The likeliest noise, of the first minute or two."""
     sample = steps.until(LEVELS_FROM)
     trials = [Levels(a, v) for a in ATTITUDE_WANDER for v in VELOCITY_NOISE_M_S]
-    return trials[int(np.argmax(likelihoods(sample, trials)))]
+    return trials[int(np.argmax(likelihoods(sample, trials, start)))]
 
 
 def _integral(t: Array, x: Array) -> Array:

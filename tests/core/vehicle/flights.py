@@ -51,7 +51,7 @@ def flight_with(t, R, v_n, height, f_b, *, commands=None, volts=None, airspeed=N
         airspeed=np.full(n, np.nan) if airspeed is None else airspeed,
         ekf_wind=np.zeros((n, 0)),
         velocity_sigma=0.01,
-        attitude_sigma=1e-3,
+        attitude_sigma=np.full(3, 1e-3),
     )
 
 
@@ -161,6 +161,9 @@ def plane_flight(
     servo_lag=0.14,
     kicks=0.0,
     angles=0.02,
+    turning=0.25,
+    speeds=3.0,
+    turned=0.0,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
@@ -171,12 +174,14 @@ def plane_flight(
     plane along, so that it flies through them as through still air, m/s.  The rudder moves at
     random, and by the sideslip that it holds; or it is kicked this far to either side, and the
     plane slips as it does; ``angles`` is the standard deviation of the angle of attack.  Servos
-    and motor follow behind a low-pass, s.
+    and motor follow behind a low-pass, s.  Standard deviations of the rate of turn and of the
+    speed are ``turning``, rad/s, and ``speeds``, m/s; the recorded heading is ``turned`` too far
+    all flight long, rad.
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
     t = 50.0 + STEP * np.arange(n)
-    speed, yaw = 24.0 + smooth(rng, n, 3.0, 4.0), np.cumsum(smooth(rng, n, 0.25, 5.0)) * STEP
+    speed, yaw = 24.0 + smooth(rng, n, speeds, 4.0), np.cumsum(smooth(rng, n, turning, 5.0)) * STEP
     alpha, beta = -0.03 + smooth(rng, n, angles), smooth(rng, n, 0.03)
     pitch = smooth(rng, n, 0.1, 4.0)
     R = rotation_from_euler(smooth(rng, n, 0.4, 4.0), pitch, yaw)
@@ -213,8 +218,8 @@ def plane_flight(
     if reading is not None:
         airspeed = reading * speed * np.sqrt(rho / 1.225) + 0.2 * rng.normal(size=n)
     commands = np.stack([throttle, rudder], axis=1)
-    if heading_off:
-        off = smooth(rng, n, heading_off, 15.0)
+    if heading_off or turned:
+        off = turned + (smooth(rng, n, heading_off, 15.0) if heading_off else np.zeros(n))
         zero = np.zeros(n)
         R = rotation_from_euler(zero, zero, off) @ R
     return flight_with(t, R, v_n, height, f_b, commands=commands, airspeed=airspeed)

@@ -171,12 +171,15 @@ def test_an_attitude_that_is_turned_all_flight_long_is_turned_back():
         ("tilt_roll", "tilt_pitch", "heading"), (*tilt[:2], heading - taken), strict=True
     ):
         theta[model.index[name]] = value
-    engine = SimpleNamespace(
-        solution=lambda: SimpleNamespace(theta=theta), model=model, point=point
-    )
+    known = 0.01 + 0.001 * np.arange(model.size)
+    found = SimpleNamespace(theta=theta, covariance=np.diag(known**2))
+    engine = SimpleNamespace(solution=lambda: found, model=model, point=point)
     true = rotation_from_euler(0.3 * np.sin(T), 0.2 * np.cos(T), 0.1 * T)
     turn = rotation_from_vector(np.array([[0.0, 0.0, heading]]))
     recorded = turn @ true @ rotation_from_vector(tilt[None])
-    sensors = Sensors(SCALE, OFFSET, np.zeros(3), tilt=attitude_error(engine))
+    off, sigma = attitude_error(engine)
+    places = [model.index[name] for name in ("tilt_roll", "tilt_pitch", "heading")]
+    np.testing.assert_allclose(sigma, known[places])
+    sensors = Sensors(SCALE, OFFSET, np.zeros(3), tilt=off, tilt_sigma=sigma)
     np.testing.assert_allclose(sensors.attitude(recorded), true, atol=0.005)
     assert np.abs(recorded - true).max() > 0.05
