@@ -69,7 +69,8 @@ class Effect(ABC):
         manoeuvre: what would show it, as an imperative.
         note: what a person must know where it is found, as a part of a sentence; may be empty.
         together: whether it is asked what its unknowns do together where gusts hide single ones.
-        commanded: whether it is of what a command makes, which no wind has to be known for.
+        commanded: whether it is of what a command makes, which no wind has to be known for, and in
+            the airframe's file.
     """
 
     name: str = ""

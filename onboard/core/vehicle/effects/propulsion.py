@@ -17,7 +17,6 @@ class Propulsion(Effect):
     """Full thrust by mass is ``exp(log_ratio)`` of the simulator's."""
 
     name = "thrust_scale"
-    commanded = True
     manoeuvre = "climb at full throttle, then glide"
 
     def __init__(self, frame: PlaneAirframe) -> None:
