@@ -33,7 +33,7 @@ from onboard.core.estimate.limits import (
     UNKNOWN_PLACE_M,
 )
 from onboard.core.estimate.shared_windows import SharedWindows
-from onboard.core.estimate.wandering import OFFSET
+from onboard.core.estimate.wandering import STEADY_GAIN, STEADY_OFFSET
 from onboard.core.estimate.wandering import inflation as inflation_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.medians import NORMAL_MEDIAN
@@ -219,8 +219,9 @@ class _Fit:
         """(2, 3) what correlation of the residuals adds to variances of mean and variation."""
         t, r = self._windows.t, self.residual
         varies = self.force - self.force.mean(axis=0)
-        mean = [inflation_of(t, r[:, j], OFFSET) for j in AXES]
-        return np.array([mean, [inflation_of(t, varies[:, j] * r[:, j]) for j in AXES]])
+        mean = [inflation_of(t, r[:, j], STEADY_OFFSET) for j in AXES]
+        varying = [inflation_of(t, varies[:, j] * r[:, j], STEADY_GAIN) for j in AXES]
+        return np.array([mean, varying])
 
     def information(self, inflation: Array) -> Array:
         """(15, 15) of the windows alone."""

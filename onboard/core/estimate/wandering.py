@@ -23,10 +23,10 @@ from onboard.core.maths.arrays import Array
 
 SHARES = np.array([0.0, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97])
 """Of the variance that wanders, those above none each as likely as the next beforehand."""
-NO_OFFSET = 0.5
+STEADY_GAIN = 0.5
 """How likely it is that what varies with the force does not wander: as likely as not, for nothing
 that is known makes a gain another one within a flight [probability]."""
-OFFSET = 1.0 / len(SHARES)
+STEADY_OFFSET = 1.0 / len(SHARES)
 """The same of what does not vary with it: no likelier than any other share, for every offset
 follows its sensor's temperature, and a short flight that does not show it is no evidence that it
 does not [physics; with one half, quarters of flights for building differ by 2.1 times the variance
@@ -36,7 +36,7 @@ CONSTANTS = 10
 inflation by less than blocks scatter]."""
 
 
-def inflation(t: Array, scores: Array, steady: float = NO_OFFSET) -> float:
+def inflation(t: Array, scores: Array, steady: float) -> float:
     """Variance of the mean of scores over that of white noise of the same size, at least 1.
 
     Args:

@@ -187,9 +187,7 @@ def whiten(
     whitener: Array,
     log_var: Array,
 ) -> int:
-    """Innovations of the numbers ``number`` into E, W, whitener and log_var.
-
-    Of these, only as many rows are written as there are numbers.
+    """Innovations of the numbers ``number`` into as many rows of E, W, whitener and log_var.
 
     Returns:
         0, or the first (from 1) whose covariance is not positive.

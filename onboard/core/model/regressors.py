@@ -209,11 +209,6 @@ class SegmentRegressors:
         return self.ned[:, 0:3]
 
     @property
-    def position_ned(self) -> Array:
-        """(K + 1, 3, m) as :attr:`position_body`, in NED."""
-        return self.ned[:, 3:6]
-
-    @property
     def attitude_ned(self) -> Array:
         """(K + 1, 3, m) as :attr:`attitude_body`, in NED."""
         return self.ned[:, 6:9]

@@ -50,6 +50,11 @@ class Chosen:
     partly: tuple[str, ...] = ()
     together: tuple[str, ...] = ()
 
+    @property
+    def taken(self) -> tuple[str, ...]:
+        """Effects whose numbers are used: named, or known together."""
+        return (*self.effects, *self.together)
+
 
 def choose(choices: Choices) -> Chosen:
     """Drop what the others make needless, take in what passes now, until neither is any."""

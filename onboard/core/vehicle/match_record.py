@@ -86,7 +86,7 @@ def differences(m: Matched) -> tuple[Difference, ...]:
     for name in chosen.effects:
         if name not in m.handed_back:
             continue
-        without = tuple(n for n in (*chosen.effects, *chosen.together) if n != name)
+        without = tuple(n for n in chosen.taken if n != name)
         places = m.model.indices(name)
         effect = m.model.effect(name)
         shown = effect.shown(fit.theta[places].tolist(), fit.sigma[places].tolist())
@@ -171,7 +171,7 @@ def mismatch_of(m: Matched) -> dict[str, AxisMismatch]:
 def drifts_of(m: Matched) -> Alone | None:
     """How velocity drifts when the nominal model, and the found one, fly on alone."""
     before = _drift(m.model, m.model.nominal, m.nominal)
-    after = _drift(m.model, m.model.nominal if m.held is m.nominal else m.fit.theta, m.held)
+    after = _drift(m.model, m.flies_by, m.held)
     if not len(before):
         return None
     t: Array = m.model.flight.step_s * np.arange(1.0, len(before) + 1.0)

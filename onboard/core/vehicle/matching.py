@@ -73,10 +73,14 @@ class Matched:
 
     @property
     def handed_back(self) -> tuple[str, ...]:
-        """Effects whose numbers a file of the airframe is to have: named, or known together."""
+        """Effects whose numbers a file of the airframe is to have: all that are the vehicle's."""
         none = {*self.stand_ins, *spoilt_by(beyond_of(self.model.effects))}
-        every = (*self.chosen.effects, *self.chosen.together)
-        return tuple(name for name in every if name not in none)
+        return tuple(name for name in self.chosen.taken if name not in none)
+
+    @property
+    def flies_by(self) -> Array:
+        """(m,) unknowns by which it flies on: the fit's, or nominal where nothing is used."""
+        return self.model.nominal if self.held is self.nominal else self.fit.theta
 
     @property
     def model(self) -> ForceModel:
@@ -110,7 +114,7 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         fit,
         choices,
         chosen,
-        left_by(choices, (*chosen.effects, *chosen.together)),
+        left_by(choices, chosen.taken),
         nominal,
         done.turbulence,
         left,

@@ -20,8 +20,8 @@ from onboard.core.maths.frames import skew
 
 V, PSI, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)
 STATES: Final = 9
-START: Final = np.array([1.0] * 3 + [0.03] * 3 + [0.01] * 3)
-"""Standard deviations at the beginning: m/s, rad, rad/s [physics]."""
+START_M_S, START_RAD_S = 1.0, 0.01
+"""Standard deviations of velocity and bias at the beginning [physics]."""
 BIAS_WALK: Final = 2e-5
 """Wander of a gyroscope's bias, rad/s per sqrt(s) [data sheet]."""
 LOOSE_RAD: Final = 0.25
@@ -90,7 +90,7 @@ class _Filtered:
     moves: Array
 
 
-def likelihoods(steps: Steps, levels: Sequence[Levels], attitude: Array = START[PSI]) -> Array:
+def likelihoods(steps: Steps, levels: Sequence[Levels], attitude: Array) -> Array:
     """(j,) logarithm of the likelihood of what was measured, by each of the levels at once.
 
     ``attitude`` as in :func:`smoothed`.
@@ -122,7 +122,7 @@ def likelihoods(steps: Steps, levels: Sequence[Levels], attitude: Array = START[
     return score
 
 
-def smoothed(steps: Steps, levels: Levels, attitude: Array = START[PSI]) -> Smoothed:
+def smoothed(steps: Steps, levels: Levels, attitude: Array) -> Smoothed:
     """Errors by everything that was measured before and after.
 
     Args:
@@ -155,8 +155,7 @@ def attitude_known(steps: Steps, levels: Levels, attitude: Array) -> Array:
 
 def _start(attitude: Array) -> Array:
     """(9, 9) covariance at the beginning."""
-    sigma = START.copy()
-    sigma[PSI] = attitude
+    sigma = np.concatenate([np.full(3, START_M_S), attitude, np.full(3, START_RAD_S)])
     return np.diag(sigma**2)
 
 

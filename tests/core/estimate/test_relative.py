@@ -7,7 +7,7 @@ import pytest
 
 from onboard.core.estimate.relative import relative_of
 from onboard.core.estimate.shared_windows import shared_windows, window_means
-from onboard.core.estimate.wandering import OFFSET, inflation
+from onboard.core.estimate.wandering import STEADY_GAIN, STEADY_OFFSET, inflation
 from onboard.core.maths.accelerometer import SixParameters
 from tests.core.estimate.two_accelerometers import Motion, batches, wandering
 
@@ -102,9 +102,9 @@ def test_a_bump_is_left_out():
 def test_white_residuals_are_not_inflated_and_wandering_ones_are():
     rng = np.random.default_rng(8)
     t = np.arange(400.0)
-    white = [inflation(t, rng.standard_normal(400)) for _ in range(50)]
+    white = [inflation(t, rng.standard_normal(400), STEADY_GAIN) for _ in range(50)]
     assert 1.0 <= np.mean(white) < 2.0
-    slow = [inflation(t, np.repeat(rng.standard_normal(20), 20)) for _ in range(50)]
+    slow = [inflation(t, np.repeat(rng.standard_normal(20), 20), STEADY_GAIN) for _ in range(50)]
     assert 10.0 < np.median(slow) < 60.0
 
 
@@ -135,6 +135,6 @@ def test_what_warms_is_as_far_off_as_it_says_although_a_short_flight_hardly_show
         offset = np.sqrt(share) * np.array(slow)
         offset += np.sqrt(1.0 - share) * rng.standard_normal(len(t))
         seen = offset - offset.mean()
-        variance = inflation(t, seen, OFFSET) * np.mean(seen**2) / len(t)
+        variance = inflation(t, seen, STEADY_OFFSET) * np.mean(seen**2) / len(t)
         left.append(offset.mean() ** 2 / variance)
     assert 0.6 < np.mean(left) < 1.4

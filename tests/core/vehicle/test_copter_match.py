@@ -22,6 +22,10 @@ def matched(flight):
     return match_copter(flight, Signals(kind="copter"), CopterAirframe(), SIGMA)
 
 
+def handed_back(match):
+    return CopterAirframe.of({k: v for k, v in match.frame.items() if isinstance(v, float)})
+
+
 def names(match):
     return {d.name for d in match.effects}
 
@@ -61,7 +65,7 @@ def test_both_drags_are_found_with_their_sizes():
     within(match, "rotor_drag.mcoef", 0.45)
     within(match, "body_drag.x", 0.03)
     # A frame file with them has just these.
-    frame = CopterAirframe.of({k: v for k, v in match.frame.items() if isinstance(v, float)})
+    frame = handed_back(match)
     assert frame.rotor_drag == pytest.approx(0.45, rel=0.03)
     assert frame.body_drag == pytest.approx(0.03, rel=0.05)
 
@@ -82,7 +86,7 @@ def test_a_hover_hands_back_its_thrust_and_not_what_makes_it():
     match = matched(copter_flight(ratio=0.82, seed=31, seconds=120.0, still=True))
     assert names(match) == set()
     assert not match.shown
-    frame = CopterAirframe.of({k: v for k, v in match.frame.items() if isinstance(v, float)})
+    frame = handed_back(match)
 
     def thrust(hover, expo, command=0.6):
         return ((1.0 - expo) * command + expo * command**2) / hover
@@ -98,9 +102,7 @@ def test_a_hover_that_shows_nothing_is_no_closer_with_what_nobody_knows():
     match = matched(copter_flight(seed=32, seconds=120.0, still=True))
     assert not match.shown
     assert match.mismatch["z"].after == match.mismatch["z"].before
-    assert CopterAirframe.of(
-        {k: v for k, v in match.frame.items() if isinstance(v, float)}
-    ).hoverThrOut == pytest.approx(0.39)
+    assert handed_back(match).hoverThrOut == pytest.approx(0.39)
 
 
 @pytest.mark.parametrize("seconds", [11.0, 25.0, 50.0])

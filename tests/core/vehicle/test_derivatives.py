@@ -29,8 +29,9 @@ def test_likelihoods_at_once_are_those_one_by_one():
         measured,
     )
     levels = [Levels(a, v) for a in (1e-3, 1e-2) for v in (0.1, 1.0)]
-    together = likelihoods(steps, levels)
-    alone = [likelihoods(steps, [its])[0] for its in levels]
+    known = np.full(3, 0.03)
+    together = likelihoods(steps, levels, known)
+    alone = [likelihoods(steps, [its], known)[0] for its in levels]
     np.testing.assert_allclose(together, alone, rtol=1e-10)
     # Scatter of one is likelier with a noise of one than with a tenth of it.
     assert together[1] > together[0]

@@ -271,7 +271,7 @@ def test_a_tilt_of_the_attitude_is_found_from_the_velocity():
         np.broadcast_to(rotation_from_vector(np.zeros(3)), (n, 3, 3)).copy(),
         measured,
     )
-    out = smoothed(steps, Levels(1e-4, 0.02))
+    out = smoothed(steps, Levels(1e-4, 0.02), np.full(3, 0.03))
     assert np.mean(out.x[:, PSI], axis=0)[:2] == pytest.approx(tilt[:2], abs=2e-3)
 
 
