@@ -69,7 +69,8 @@ class Stream:
         apart = np.diff(self.t)
         longest = max(LONGEST_SPAN_S, SLOWER * float(np.median(apart)))
         before = np.clip(np.searchsorted(self.t, t, "right") - 1, 0, len(apart) - 1)
-        out: Mask = apart[before] <= longest
+        begun, over = t >= self.t[0] - longest, t <= self.t[-1] + longest
+        out: Mask = (apart[before] <= longest) & begun & over
         return out
 
 
@@ -81,6 +82,7 @@ class Signals:
         outputs: pulse widths by channel, microseconds; or 0 to 1 where ``normalised``.
         battery: voltage (V) and current (A, NaN where it is not measured).
         airspeed: as the autopilot reports it, m/s.
+        airspeed_dead: spans in which its sensor repeats one reading, which is not kept, s.
         ekf_wind: the autopilot's own estimate, towards north and east, m/s.
         measured_wind: by an anemometer or a tunnel: towards north and east, and its sigma, m/s.
         parameters: in force last, by name.
@@ -91,6 +93,7 @@ class Signals:
     outputs: Stream = field(default_factory=Stream)
     battery: Stream = field(default_factory=Stream)
     airspeed: Stream = field(default_factory=Stream)
+    airspeed_dead: tuple[tuple[float, float], ...] = ()
     ekf_wind: Stream = field(default_factory=Stream)
     measured_wind: Stream = field(default_factory=Stream)
     parameters: Mapping[str, float] = field(default_factory=dict)
