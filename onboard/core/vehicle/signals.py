@@ -28,6 +28,8 @@ TURNERS: Mapping[float, frozenset[int]] = {
 HELICOPTERS = (6.0, 11.0, 13.0)
 """FRAME_CLASS of what has a swash plate, whose servos have the numbers of motors."""
 THROTTLE_FUNCTION, AILERON_FUNCTION, ELEVATOR_FUNCTION, RUDDER_FUNCTION = 70, 4, 19, 21
+ELEVON_FUNCTIONS, VTAIL_FUNCTIONS = (77, 78), (79, 80)
+"""SERVOn_FUNCTION of the left and the right one of surfaces that are two in one."""
 FLAP_FUNCTIONS = (3, 2)
 """SERVOn_FUNCTION of flaps that go by themselves, and of those that a pilot sets."""
 
