@@ -18,3 +18,42 @@ def test_the_command_has_not_loaded_numpy_when_it_says_so():
         [sys.executable, "-c", asked], capture_output=True, text=True, check=True
     )
     assert said.stdout.strip() == "False"
+
+
+COMPUTING = """
+import time
+import numpy as np
+from onboard.threads import Unawaited, leave
+
+def work():
+    a = np.random.default_rng(1).normal(size=(1500, 1500))
+    print("computes", flush=True)
+    while True:
+        np.linalg.solve(a, a)
+
+Unawaited(target=work, name="learner").start()
+time.sleep(0.5)
+print("ends")
+leave(3)
+"""
+
+
+def test_a_process_whose_thread_still_computes_ends_in_good_order():
+    """The numeric library takes its memory away from under it: the service ended by SIGSEGV."""
+    for _ in range(3):
+        ended = subprocess.run(  # noqa: S603 - our own program
+            [sys.executable, "-c", COMPUTING], capture_output=True, text=True, check=False
+        )
+        assert (ended.returncode, ended.stderr) == (3, "")
+        assert ended.stdout.split() == ["computes", "ends"]
+
+
+def test_without_such_a_thread_everything_is_ended_as_ever():
+    asked = (
+        "import atexit; from onboard.threads import leave; "
+        "atexit.register(print, 'tidied'); leave(2)"
+    )
+    ended = subprocess.run(  # noqa: S603 - our own program
+        [sys.executable, "-c", asked], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stdout.strip()) == (2, "tidied")

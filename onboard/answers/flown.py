@@ -41,6 +41,7 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.kind import kind_by_motion
+from onboard.core.vehicle.repeats import measured
 from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.spans import grounded_spans, joined, lasting_height, scatter_near
@@ -199,15 +200,17 @@ class Flown:
         normalised = bool(outputs) and outputs[-1].normalised
         air = [s for s in kept if isinstance(s, AirData)]
         blown = [s for s in air if s.wind_n is not None and s.wind_e is not None]
+        airspeed, dead = measured(
+            _stream([s for s in air if s.airspeed is not None], lambda s: (s.airspeed or 0.0,))
+        )
         return Signals(
             outputs=_stream(outputs, lambda s: s.values),
             battery=_stream(
                 [s for s in kept if isinstance(s, Battery)],
                 lambda s: (s.voltage, math.nan if s.current is None else s.current),
             ),
-            airspeed=_stream(
-                [s for s in air if s.airspeed is not None], lambda s: (s.airspeed or 0.0,)
-            ),
+            airspeed=airspeed,
+            airspeed_dead=dead,
             ekf_wind=_stream(
                 [s for s in blown if s.wind_sigma is None],
                 lambda s: (s.wind_n or 0.0, s.wind_e or 0.0),

@@ -214,7 +214,12 @@ def vehicle_level(
         absent = tuple(NotTestable(n, why) for n in names)
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
     sigma = np.stack([r.sensors.force_sigma for r in (recording, *others)])
-    said = (_of_rotors(carried_s), _of_outages(flight, kind), str(doubt))
+    said = (
+        _of_rotors(carried_s),
+        _of_outages(flight, kind),
+        _of_a_sensor(flight, kind),
+        str(doubt),
+    )
     flight = joined([flight, *(_further(other, kind, airframe) for other in others)])
     try:
         if kind in COPTERS:
@@ -278,6 +283,12 @@ def _of_outages(flight: Flight, kind: str) -> str:
     what = "outputs" if kind in COPTERS else "outputs or airspeed"
     missing = f"{what} are missing for {flight.unheard_s:.0f} s, of which nothing is told"
     return missing if flight.unheard_s >= TOLD_S else ""
+
+
+def _of_a_sensor(flight: Flight, kind: str) -> str:
+    """That a plane's airspeed sensor has died."""
+    dead = f"the airspeed sensor repeats one reading for {flight.dead_s:.0f} s, which is not used"
+    return dead if kind in PLANES and flight.dead_s >= TOLD_S else ""
 
 
 def _noted(found: VehicleMatch, *said: str) -> VehicleMatch:

@@ -41,7 +41,7 @@ DISTRUST = {
     "few_satellites": "too few satellites",
     "hdop": "satellites badly spread (HDOP)",
     "speed_accuracy": "speed too inaccurate",
-    "gps_glitch": "velocity jumped (glitch)",
+    "gps_glitch": "fixes contradict each other (glitch)",
     "ekf_gps_glitch": "the autopilot reports a GPS glitch",
     "ekf_unhealthy": "the autopilot's state estimate is not ready",
     "ekf_unknown": "the autopilot has not said yet whether its state estimate is ready",

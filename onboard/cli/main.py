@@ -20,7 +20,7 @@ from onboard import __version__
 from onboard.cli.simulator import make_importable
 from onboard.errors import OnboardError
 from onboard.printable import printable
-from onboard.threads import in_one_thread
+from onboard.threads import in_one_thread, leave
 
 DONE, USAGE, INTERRUPTED = 0, 2, 130
 COMPLETION = "_ONBOARD_COMPLETE"
@@ -183,4 +183,4 @@ def main() -> None:
     in_one_thread(os.environ)
     status = run()
     gc.freeze()  # what ends with the process need not be looked through: 0.2 s after a flight
-    sys.exit(status)
+    leave(status)

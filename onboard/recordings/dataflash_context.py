@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.views import tells_views
+from onboard.core.vehicle.signals import THROTTLE_FUNCTION, rotor_functions
 from onboard.recordings.dataflash_formats import Format, Records
 from onboard.recordings.dataflash_index import DataflashIndex
 
@@ -22,8 +23,6 @@ LONGEST_WAIT_S = 1.0
 JitterCorrection.h): what is further off is damaged, or of a receiver that has just been found."""
 EKF2 = 2.0
 ATTITUDE, EKF3_ATTITUDE = "ATT", "XKF1"
-MOTOR_FUNCTIONS = frozenset((*range(33, 41), *range(82, 86), 70))
-"""SERVOn_FUNCTION of motors 1 ... 12, and of a plane's throttle."""
 CHANNELS = 14
 
 
@@ -162,10 +161,9 @@ def _lanes(index: DataflashIndex) -> Series:
 
 
 def _motor_channels(parameters: Mapping[str, float]) -> tuple[str, ...]:
+    driving = {*rotor_functions(parameters.get("FRAME_CLASS")), THROTTLE_FUNCTION}
     numbers = range(1, CHANNELS + 1)
-    return tuple(
-        f"C{n}" for n in numbers if parameters.get(f"SERVO{n}_FUNCTION") in MOTOR_FUNCTIONS
-    )
+    return tuple(f"C{n}" for n in numbers if parameters.get(f"SERVO{n}_FUNCTION") in driving)
 
 
 def _motor_range(parameters: Mapping[str, float]) -> tuple[float, float]:

@@ -16,7 +16,9 @@ from onboard.answers.verdict import (
     to_fly,
     unused_in_words,
 )
+from onboard.answers.words import DISTRUST
 from onboard.core.diagnosis.records import Unused, Verdict
+from onboard.core.gps.distrust import Distrust
 from onboard.core.physics.catalogue import kinds, size_of, title_of
 from onboard.core.physics.finding import Quantity
 from tests.report.diagnoses_by_hand import NAN, advice_on, diagnosis, effect
@@ -146,3 +148,8 @@ def test_moments_that_were_not_used_are_said_once_each():
     long = (Unused(10.0, 14.0, "few_satellites"), Unused(20.0, 20.2, "few_satellites"))
     (said,) = unused_in_words(diagnosis(unused=long))
     assert said.startswith("4 s of flight were not used (10 to 14 s, at 20 s; ")
+
+
+def test_a_glitch_is_not_said_to_be_of_the_velocity_alone():
+    """A position that leaps away from its velocity is one as well."""
+    assert "velocity" not in DISTRUST[Distrust.GPS_GLITCH.value]

@@ -119,7 +119,10 @@ class Companions:
         t = self._asked(imu)
         if not len(t) or not t[0] <= jump.moment <= t[-1]:
             return jump
-        i = int(np.argmin(np.abs(t - jump.moment)))
+        # What jumps within a window is there in part, and has jumped in the next one.
+        after = int(np.searchsorted(t, jump.moment))
+        about = t[max(after - 1, 0) : after + 1]
+        i = max(after - 1, 0) + int(np.argmax(self._told(imu, about).gain))
         return jump.at(jump.moment, self._witness(imu, t, i))
 
     def shown_from(self, imu: int, known: Array, variance: float) -> Array | None:

@@ -112,9 +112,9 @@ class Judge:
         mismatch = self._mismatch(before, after, effects, ladder)
         verdict, note = self._verdict(effects, mismatch, changing, moving=moving)
         trim = trim_in_words(self.calibrator.parameters)
-        others = of_others(self.choice, self.final.origin.t0)
         c = self.calibration
         claimed = np.array(c.covariance).diagonal()
+        others = of_others(self.choice, self.final.origin.t0, claimed)
         open_ = in_words(self.undecided, SixParameters(c.scale, c.offset), claimed)
         note = " ".join(x for x in (note, open_, others, trim) if x)
         if verdict is Verdict.INSUFFICIENT:

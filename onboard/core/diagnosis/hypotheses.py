@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
@@ -18,7 +20,7 @@ from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.maths.arrays import Array
-from onboard.core.physics.effects.bias_step import LARGEST, BiasStep
+from onboard.core.physics.effects.bias_step import LARGEST, BiasStep, Witness
 from onboard.core.physics.finding import Confounder
 
 
@@ -286,14 +288,22 @@ def _simplify(choice: Choice) -> None:
             choice.chosen[choice.chosen.index(c)] = better
 
 
-def of_others(choice: Choice, t0: float) -> str:
+def _counts(witness: Witness, claimed: Array) -> bool:
+    """Whether half of a jump is most of what is not known of an offset, (3,) variances."""
+    return bool(np.any((0.5 * witness.size) ** 2 > 0.5 * claimed))
+
+
+def of_others(choice: Choice, t0: float, claimed: Array) -> str:
     """What the other accelerometers say of a jump, if that is not the sensor's alone.
 
     Args:
         choice: what was chosen.
         t0: what times are said from, s on the boot clock.
+        claimed: (6,) variances of the six: one that nobody knows whose it is matters where most of
+            an offset's is about it.
     """
-    if (jump := choice.undecided) is not None and jump.witness is not None:
+    jump = choice.undecided
+    if jump is not None and jump.witness is not None and _counts(jump.witness, claimed[3:]):
         by = zip("xyz", jump.witness.size.tolist(), strict=True)
         size = ", ".join(f"{axis} {x:+.2f}" for axis, x in by)
         return (

@@ -70,6 +70,7 @@ class Variant:
         among: whether there are other flights of the vehicle, though one alone is looked at.
         beyond: what repeats with the motion, or with time, and is no effect's
             (:mod:`onboard.core.vehicle.structure`).
+        wind_from: when the wind of a single flight became another at once, s; None: never.
     """
 
     profile_top: float = TOP_M
@@ -80,6 +81,7 @@ class Variant:
     through: float = 0.0
     among: bool = False
     beyond: tuple[str, ...] = ()
+    wind_from: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +200,7 @@ def copter_model(
     still = start(flight)
     everything: list[Effect] = [
         own([Wind(sigma) for sigma in wind_sigmas(flight)]),
-        *([WindChange(flight)] if CHANGE in variant.beyond else []),
+        *([WindChange(flight, moment=variant.wind_from)] if CHANGE in variant.beyond else []),
         own([WindProfile(variant.profile_top) for _ in parts]),
         *([own([GustDrag(variant.gusts) for _ in parts])] if variant.gusts else []),
         *([AirDensity()] if flown_high(flight) else []),

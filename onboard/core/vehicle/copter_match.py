@@ -31,6 +31,7 @@ from onboard.core.vehicle.effects.rotor_wind import PLAUSIBLE as THROUGH
 from onboard.core.vehicle.effects.thrust_curve import ThrustCurve
 from onboard.core.vehicle.effects.thrust_scale import ThrustScale
 from onboard.core.vehicle.effects.voltage_sag import VoltageSag
+from onboard.core.vehicle.effects.wind_change import CHANGE
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import Flight
@@ -49,7 +50,7 @@ from onboard.core.vehicle.records import Compared, Difference, VehicleMatch
 from onboard.core.vehicle.said import change_in
 from onboard.core.vehicle.signals import Signals
 from onboard.core.vehicle.structure import structures
-from onboard.core.vehicle.sudden import CHANGES, change_of
+from onboard.core.vehicle.sudden import CHANGES, change_of, wind_instead
 from onboard.core.vehicle.turbulence import turbulence_of
 
 MANOEUVRES = {
@@ -134,7 +135,8 @@ def _found(flight: Flight, frame: CopterAirframe, force_sigma: Array, given: Var
     if len(variant.beyond) < MOST_BEYOND and (more := structures(found.fit, variant.beyond)):
         # All else is asked anew beside it: what looked like gusts may have been this.
         beyond = (*variant.beyond, more[0].key)
-        return _found(flight, frame, force_sigma, replace(given, beyond=beyond))
+        more_of_it = replace(given, beyond=beyond, wind_from=variant.wind_from)
+        return _found(flight, frame, force_sigma, more_of_it)
     return found
 
 
@@ -179,13 +181,21 @@ def _with_change(
     Of several flights it is that of ``plain``.
     """
 
+    def blowing(variant: Variant) -> ForceModel:
+        return copter_model(flight, frame, force_sigma, variant)
+
     def model(change: Change | None) -> ForceModel:
-        return copter_model(flight, frame, force_sigma, replace(plain, change=change))
+        return blowing(replace(plain, change=change))
 
     first, change = None, plain.change
     if flight.parts == 1:
         first = likelier(model(None))
         change = change_of(first, model)
+    if first is not None and change is not None and CHANGE not in plain.beyond:
+        gone = wind_instead(first, change, model, lambda t: blowing(_turning(plain, t)))
+        if gone is not None:
+            # The vehicle may have changed as well: that is asked anew.
+            return _with_change(flight, frame, force_sigma, _turning(plain, gone))
     if change is not None:
         found = matched(model(change))
         if set(CHANGES) & set(found.chosen.effects):
@@ -196,6 +206,11 @@ def _with_change(
                 change, found = since, other
             return replace(plain, change=change), found
     return replace(plain, change=None), matched(model(None), first)
+
+
+def _turning(plain: Variant, moment: float) -> Variant:
+    """The same in a wind that becomes another at a moment, s."""
+    return replace(plain, change=None, wind_from=moment, beyond=(*plain.beyond, CHANGE))
 
 
 def _better(other: Matched, found: Matched) -> bool:

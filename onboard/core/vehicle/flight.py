@@ -70,6 +70,7 @@ class Flight:
         history: of the commands; None where they are those of the flight alone.
         place: (n,) of each step in the history.
         unheard_s: how long in the air commands or airspeed were not recorded, which is left out, s.
+        dead_s: how long in the air the airspeed sensor repeated one reading, s.
     """
 
     t: Array
@@ -97,6 +98,7 @@ class Flight:
     history: History | None = None
     place: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unheard_s: float = 0.0
+    dead_s: float = 0.0
 
     def __post_init__(self) -> None:
         """One recording, in a wind that nobody measured, where nothing else is said."""
@@ -199,6 +201,7 @@ def flight_of(
     hit = np.linalg.norm(joined["f_b"], axis=1) > CONTACT_M_S2
     flown = ~inside(joined["t"], grounded) & ~hit
     air = flown & (joined["known"] > 0.0)
+    dead = inside(joined["t"], list(signals.airspeed_dead))
     if not air.any():
         return None
     flight = Flight(
@@ -223,7 +226,8 @@ def flight_of(
         measured_wind=joined["measured_wind"],
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
         history=History(joined["commands"], joined["piece"].astype(np.int64)),
-        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air)),
+        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air & ~dead)),
+        dead_s=STEP_S * float(np.count_nonzero(flown & dead)),
     )
     return flight.cut(air)
 

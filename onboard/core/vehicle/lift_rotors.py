@@ -15,7 +15,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.signals import MOTOR_FUNCTIONS, Signals
+from onboard.core.vehicle.signals import Signals, rotor_functions
 
 TURNING: Final = 0.05
 """Share of a rotor's range past which it turns: thrust goes by the square of the speed, so that it
@@ -30,7 +30,7 @@ def rotors_of(signals: Signals) -> tuple[int, ...]:
     """Channels of the rotors that stand upright; none of a plane without, or whose rotors tilt."""
     if signals.normalised or _tilting(signals):
         return ()
-    return signals.channels_of(*MOTOR_FUNCTIONS)
+    return signals.channels_of(*rotor_functions(signals.parameters.get("Q_FRAME_CLASS")))
 
 
 def unseen(signals: Signals) -> bool:

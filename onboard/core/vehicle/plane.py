@@ -34,17 +34,17 @@ from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.several import wind_sigmas
 from onboard.core.vehicle.signals import (
     ELEVATOR_FUNCTION,
+    ELEVON_FUNCTIONS,
     FLAP_FUNCTIONS,
     RUDDER_FUNCTION,
     THROTTLE_FUNCTION,
+    VTAIL_FUNCTIONS,
     Signals,
     Stream,
 )
 
 MIDDLE_US, HALF_US = 1500.0, 500.0
 """Pulse width of a surface at rest, and to its end."""
-SURFACES = ((RUDDER_FUNCTION,), (ELEVATOR_FUNCTION,), FLAP_FUNCTIONS)
-"""In the order of the commands, after the throttle."""
 FULL_S = 0.9
 """Share of the readings that an airspeed sensor must have [cost]."""
 LEAST_AIRSPEED_M_S = 5.0
@@ -66,18 +66,49 @@ def plane_commands(signals: Signals) -> Stream:
     if not low < high or float(np.std(raw[:, k])) <= 0.0:
         return Stream()
     share = np.clip((raw[:, k] - low) / (high - low), 0.0, 1.0)
-    surfaces = [_turned(signals, functions) for functions in SURFACES]
+    # In the order of the commands, after the throttle.
+    surfaces = [
+        _turned(signals, (RUDDER_FUNCTION,), (VTAIL_FUNCTIONS, -1.0)),
+        _turned(signals, (ELEVATOR_FUNCTION,), (VTAIL_FUNCTIONS, 1.0), (ELEVON_FUNCTIONS, 1.0)),
+        _turned(signals, FLAP_FUNCTIONS),
+    ]
     return Stream(signals.outputs.t, np.stack([share, *surfaces], axis=1))
 
 
-def _turned(signals: Signals, functions: tuple[int, ...]) -> Array:
-    """(j,) -1 to 1 of a surface; zero where there is none."""
-    channels, raw = signals.channels_of(*functions), signals.outputs.x
-    if not channels:
-        return np.zeros(len(raw))
-    us = raw[:, channels[0]]
+def _turned(
+    signals: Signals, functions: tuple[int, ...], *mixed: tuple[tuple[int, int], float]
+) -> Array:
+    """(j,) -1 to 1 of a surface; zero where there is none.
+
+    Args:
+        signals: with outputs.
+        functions: of those that are a surface of their own; the first that there is.
+        mixed: functions of a left and a right one, else, and the sign with which the right one
+            goes into half of their sum.
+    """
+    channels = signals.channels_of(*functions)
+    if channels:
+        return _deflected(signals, channels[0])
+    for pair, sign in mixed:
+        both = signals.channels_of(*pair)
+        if len(both) == len(pair):
+            # Of surfaces of their own the sign is the linkage's, of these it says what is added.
+            left, right = (_deflected(signals, k) * _way(signals, k) for k in both)
+            out: Array = 0.5 * (left + sign * right)
+            return out
+    return np.zeros(len(signals.outputs))
+
+
+def _deflected(signals: Signals, channel: int) -> Array:
+    """(j,) -1 to 1, by the pulse width."""
+    us = signals.outputs.x[:, channel]
     out: Array = np.where(us > 0.0, us - MIDDLE_US, 0.0) / HALF_US
     return out
+
+
+def _way(signals: Signals, channel: int) -> float:
+    """Minus one where the servo is mounted the other way round."""
+    return -1.0 if signals.parameters.get(f"SERVO{channel + 1}_REVERSED", 0.0) > 0.0 else 1.0
 
 
 def has_airspeed(flight: Flight) -> bool:

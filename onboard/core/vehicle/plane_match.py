@@ -9,7 +9,7 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.agreement import told_alone
-from onboard.core.vehicle.air import SIDE
+from onboard.core.vehicle.air import SIDE, UP
 from onboard.core.vehicle.airframe_file import numbers_of_file
 from onboard.core.vehicle.effects.air_density import AirDensity
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
@@ -18,11 +18,11 @@ from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.side_force import SideForce
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S
+from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S, SURE
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, likelier, matched
 from onboard.core.vehicle.noise import rms
-from onboard.core.vehicle.plane import plane_missing, plane_model, unstalled
+from onboard.core.vehicle.plane import has_airspeed, plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_curves import plane_curves
 from onboard.core.vehicle.records import VehicleMatch
@@ -30,6 +30,9 @@ from onboard.core.vehicle.structure import structures
 
 LEAST_INDUCED = 0.01
 """Of the file's induced drag, that a file may have where there is none [use]."""
+FALSE_SENSOR = (
+    "the airspeed sensor reads what the force of the wing contradicts, and none of it is used"
+)
 MANOEUVRES = {
     e.name: e.manoeuvre for e in (AirDensity, AirspeedScale, Propulsion, SideForce, WindProfile)
 }
@@ -48,7 +51,11 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     if found is None:
         return None
     effects = differences(found)
-    untested = not_testable_of(found, plane_missing(found.model.flight), MANOEUVRES)
+    silenced = has_airspeed(flight) and not has_airspeed(found.model.flight)
+    absent = plane_missing(found.model.flight)
+    if silenced:
+        absent[AirspeedScale.name] = "the sensor reads what the force contradicts"
+    untested = not_testable_of(found, absent, MANOEUVRES)
     match = vehicle_match(
         found,
         "plane",
@@ -57,6 +64,8 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         frame=_coefficients(found, frame),
         curves=plane_curves(found, frame),
     )
+    if silenced:
+        match = replace(match, note="; ".join(filter(None, (match.note, FALSE_SENSOR))))
     return told.beside(match)
 
 
@@ -81,7 +90,31 @@ def _found(
     if more and len(beyond) < MOST_BEYOND:
         # All else is asked anew beside it: what looked like gusts may have been this.
         return _found(flight, frame, force_sigma, (*beyond, more[0].key))
+    if _false(found):
+        return _found(_deaf(flight), frame, force_sigma)
     return found
+
+
+def _false(found: Matched) -> bool:
+    """Whether the airspeed sensor reads gusts that the wing does not feel.
+
+    Lift goes with the square of the airspeed: gusts along the flow cannot be more than what is left
+    of the force would be by itself.
+    """
+    model, air = found.fit.model, found.turbulence
+    if AirspeedScale.name not in {e.name for e in model.effects} or not air.found:
+        return False
+    k = model.axes.index(UP)
+    u_b = model.air(found.fit.theta).u_b
+    ahead_n = np.einsum("nij,ni->nj", model.flight.R_bn, u_b)
+    ahead_n /= np.maximum(np.linalg.norm(u_b, axis=1), 1.0)[:, None]
+    slope = np.einsum("ni,ni->n", model.gust_slope(found.fit.theta)[:, k], ahead_n)
+    return air.rms - SURE * air.sigma > rms(found.fit.residual[:, k]) / rms(slope)
+
+
+def _deaf(flight: Flight) -> Flight:
+    """The flight without its airspeed sensor."""
+    return replace(flight, airspeed=np.full(len(flight), np.nan))
 
 
 def _slipping(

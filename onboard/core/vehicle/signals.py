@@ -16,13 +16,28 @@ SLOWER = 4.0
 """Times the usual distance of two samples, past which a slow stream has an outage [probability: of
 telemetry that loses a fifth of its messages three in a row are lost once in a hundred]."""
 EMPTY = np.zeros(0)
-MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86))
-"""SERVOn_FUNCTION of motors 1 to 12."""
+MOTOR_FUNCTIONS = (*range(33, 41), *range(82, 86), *range(160, 180))
+"""SERVOn_FUNCTION of motors 1 to 32."""
+TRICOPTER, SINGLE, COAXIAL = 7.0, 8.0, 9.0
+TURNERS: Mapping[float, frozenset[int]] = {
+    TRICOPTER: frozenset({39}),
+    SINGLE: frozenset(range(33, 37)),
+    COAXIAL: frozenset(range(33, 37)),
+}
+"""By FRAME_CLASS: functions of motors that are servos there, which turn a rotor or its stream."""
 HELICOPTERS = (6.0, 11.0, 13.0)
 """FRAME_CLASS of what has a swash plate, whose servos have the numbers of motors."""
 THROTTLE_FUNCTION, AILERON_FUNCTION, ELEVATOR_FUNCTION, RUDDER_FUNCTION = 70, 4, 19, 21
+ELEVON_FUNCTIONS, VTAIL_FUNCTIONS = (77, 78), (79, 80)
+"""SERVOn_FUNCTION of the left and the right one of surfaces that are two in one."""
 FLAP_FUNCTIONS = (3, 2)
 """SERVOn_FUNCTION of flaps that go by themselves, and of those that a pilot sets."""
+
+
+def rotor_functions(frame_class: float | None) -> tuple[int, ...]:
+    """SERVOn_FUNCTION of what drives a rotor, where FRAME_CLASS or Q_FRAME_CLASS is this."""
+    servos = TURNERS.get(frame_class, frozenset()) if frame_class is not None else frozenset()
+    return tuple(f for f in MOTOR_FUNCTIONS if f not in servos)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +71,8 @@ class Stream:
         apart = np.diff(self.t)
         longest = max(LONGEST_SPAN_S, SLOWER * float(np.median(apart)))
         before = np.clip(np.searchsorted(self.t, t, "right") - 1, 0, len(apart) - 1)
-        out: Mask = apart[before] <= longest
+        begun, over = t >= self.t[0] - longest, t <= self.t[-1] + longest
+        out: Mask = (apart[before] <= longest) & begun & over
         return out
 
 
@@ -68,6 +84,7 @@ class Signals:
         outputs: pulse widths by channel, microseconds; or 0 to 1 where ``normalised``.
         battery: voltage (V) and current (A, NaN where it is not measured).
         airspeed: as the autopilot reports it, m/s.
+        airspeed_dead: spans in which its sensor repeats one reading, which is not kept, s.
         ekf_wind: the autopilot's own estimate, towards north and east, m/s.
         measured_wind: by an anemometer or a tunnel: towards north and east, and its sigma, m/s.
         parameters: in force last, by name.
@@ -78,6 +95,7 @@ class Signals:
     outputs: Stream = field(default_factory=Stream)
     battery: Stream = field(default_factory=Stream)
     airspeed: Stream = field(default_factory=Stream)
+    airspeed_dead: tuple[tuple[float, float], ...] = ()
     ekf_wind: Stream = field(default_factory=Stream)
     measured_wind: Stream = field(default_factory=Stream)
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -105,7 +123,7 @@ class Signals:
             moving = np.std(np.nan_to_num(self.outputs.x), axis=0) > 0.0
             return tuple(np.flatnonzero(moving).tolist())
         if any(name.startswith("SERVO") for name in self.parameters):
-            return self.channels_of(*MOTOR_FUNCTIONS)
+            return self.channels_of(*rotor_functions(self.parameters.get("FRAME_CLASS")))
         return tuple(
             np.flatnonzero(np.std(np.nan_to_num(self.outputs.x), axis=0) > 5.0).tolist()[:8]
         )

@@ -27,9 +27,10 @@ from onboard.core.vehicle.limits import (
     BLOCK_S,
     FALSE_ALARM,
     LEAST_NOISE_M_S2,
+    STEP_S,
     WINDOW_STEPS,
 )
-from onboard.core.vehicle.matching import deviance
+from onboard.core.vehicle.matching import deviance, likelier
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, onsets, rms
 from onboard.core.vehicle.recursion import accumulated, starts_of
@@ -40,6 +41,8 @@ GRADUAL = (0.25, 1.0)
 """Shares of a flight over which a change may go that is no sudden one [use]."""
 Changing: TypeAlias = Callable[[Change], ForceModel]
 """Makes the model of the fit's flight that has this change besides."""
+Blown: TypeAlias = Callable[[float], ForceModel]
+"""Makes the model of the fit's flight whose wind becomes another at this moment."""
 
 
 def change_of(fit: Fit, changing: Changing) -> Change | None:
@@ -63,6 +66,24 @@ def change_of(fit: Fit, changing: Changing) -> Change | None:
     others = [_with(fit, changing(c)) for c in _gradual(fit, change)]
     ahead = min(deviance(other) - deviance(its) for other in others) / its.scale
     return change if ahead > AMBIGUOUS else None
+
+
+def wind_instead(fit: Fit, change: Change, changing: Changing, blown: Blown) -> float | None:
+    """When the wind became another, where that tells more of a flight than a change of it does.
+
+    A front is no change of the vehicle: beside a wind that is one for the whole flight it looks
+    like less of everything by which the vehicle feels the air.
+
+    Args:
+        fit: of a model that knows neither.
+        change: of the mass or the thrust, which was found.
+        changing: makes the model that has one.
+        blown: makes the model whose wind becomes another at a moment, s.
+    """
+    without = deviance(_with(fit, changing(change)))
+    near = [change.begin + k * WINDOW_STEPS * STEP_S for k in (-1, 0, 1)]
+    best, moment = min((deviance(likelier(blown(t))), t) for t in near)
+    return moment if best < without else None
 
 
 def _by_chance(gain: float, moments: int) -> bool:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import threading
 from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any, ParamSpec, TypeVar
+
+from onboard.threads import Unawaited
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -26,7 +27,7 @@ class Worker:
             SimpleQueue()
         )
         self._ended = asyncio.Event()
-        threading.Thread(target=self._serve, name=name, daemon=True).start()
+        Unawaited(target=self._serve, name=name).start()
 
     async def call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Run it after all that was asked before; its result or exception."""

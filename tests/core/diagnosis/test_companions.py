@@ -5,6 +5,7 @@ import pytest
 
 from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S
+from onboard.core.estimate.limits import SHARED_WINDOW_S
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.bias_step import BiasStep
 from tests.core.diagnosis.flights import batches, flown
@@ -71,6 +72,17 @@ def test_of_a_jump_that_was_found_otherwise_they_say_what_they_know():
     told = found.of(alone, 1)
     assert told.witness.gain < 15.0
     assert told.witness.size == pytest.approx(np.zeros(3), abs=0.03)
+
+
+@pytest.mark.parametrize("within", [0.02, 0.2, 0.35, 0.5, 0.65, 0.8, 0.98])
+def test_where_in_a_window_it_jumps_does_not_matter(within):
+    """The window in which it jumps has a part of it, and was all that they were asked."""
+    at = 46.0 + within * SHARED_WINDOW_S
+    found = vehicle({1: (at, SIZE)})
+    by_themselves = found.jump(1, Origin(T0))
+    told = found.of(BiasStep(Origin(T0)).at(T0 + at), 1).witness
+    assert told.gain > 0.8 * by_themselves.witness.gain
+    assert np.all(np.abs(told.size - SIZE) < 4.0 * told.sigma)
 
 
 def test_a_landing_is_not_asked():

@@ -2,16 +2,21 @@
 
 import dataclasses
 import functools
+from typing import cast
 
 import numpy as np
 import pytest
 
 from benchmarks.explaining import heard
 from onboard.core.diagnosis.evidence import Judge
+from onboard.core.diagnosis.hypotheses import Choice, of_others
 from onboard.core.diagnosis.procedure import examine
+from onboard.core.diagnosis.selection import Fitter
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import SHARED_WINDOW_S
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.bias_step import BiasStep, Witness
 from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
@@ -134,3 +139,15 @@ def test_where_the_clock_began_anew_no_moment_is_asked_of_the_others():
     judge = examine(calibrator, 2)
     assert judge.choice.undecided is None
     assert "this accelerometer jumped" not in judge.diagnosis().note
+
+
+@pytest.mark.parametrize(("size", "told"), [(0.003, False), (0.2, True)])
+def test_a_jump_that_the_sigmas_do_not_notice_is_not_told(size, told):
+    """It was told of as `x +0.00, y +0.00, z +0.00 m/s^2` of a plane whose sensors did not jump."""
+    seen = Witness(50.0, 700, 0.0, np.array([0.2, 0.1, 1.0]) * size, np.full(3, 3e-4))
+    choice = Choice(
+        cast("Fitter", None), [], [], [], undecided=BiasStep(Origin(0.0)).at(169.0, seen)
+    )
+    sigma = np.array([1e-3, 1e-3, 1e-3, 0.03, 0.03, 0.004])
+    claimed = sigma**2 + np.concatenate([np.zeros(3), (0.5 * seen.size) ** 2])
+    assert ("does not tell which" in of_others(choice, 0.0, claimed)) is told

@@ -74,12 +74,14 @@ def copter_flight(
     mass=None,
     weaker=None,
     turning=(0.0, 0.0),
+    front=None,
 ):
     """A copter that manoeuvres: four motors that share the thrust, thrust by a known command.
 
     The motors follow what is asked of them behind a low-pass of ``lag``, s.  ``mass`` and
     ``weaker`` are (moment, factor): from so many seconds on it, or the thrust, is so many times
-    itself.  The wind becomes another by twice ``turning``, at an even rate, about its mean.
+    itself.  The wind becomes another by twice ``turning``, at an even rate, about its mean; or
+    at once, of a ``front`` (moment, by how much).
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -97,6 +99,8 @@ def copter_flight(
     w_n = np.zeros((n, 3))
     w_n[:, :2] = factor[:, None] * np.asarray(wind)
     w_n[:, :2] += np.linspace(-1.0, 1.0, n)[:, None] * np.asarray(turning)
+    if front is not None:
+        w_n[t - t[0] >= front[0], :2] += np.asarray(front[1])
     u = np.einsum("nji,nj->ni", R, v_n - w_n)
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
     command = 0.6 + size * np.clip(smooth(rng, n, 0.06), -0.2, 0.2)

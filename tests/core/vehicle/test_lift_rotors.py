@@ -53,6 +53,14 @@ def lifted(flight, start, end):
     return replace(flight, f_b=f_b)
 
 
+def test_the_tail_servo_of_three_rotors_turns_none_of_them():
+    """It stands in the middle all flight long, with the number of a motor."""
+    flight = plane_flight(seconds=60.0)
+    three = {n: f for n, f in FUNCTIONS.items() if f != 35.0}
+    three |= {"SERVO4_FUNCTION": 39.0, "Q_FRAME_CLASS": 7.0}
+    assert not carried(flight, spinning(flight, parameters=three)).any()
+
+
 def test_what_rotors_carry_is_left_out_with_the_time_in_which_they_run_up_and_down():
     flight = plane_flight(seconds=120.0)
     mask = carried(flight, spinning(flight, HOVER))

@@ -321,3 +321,15 @@ def test_servos_of_a_swash_plate_are_no_motors():
     for frame in (6.0, 11.0, 13.0):
         heli = functions | {"FRAME_CLASS": frame}
         assert Signals(outputs=outputs, parameters=heli).motors == ()
+
+
+@pytest.mark.parametrize(("frame", "rotors"), [(7.0, (0, 1, 3)), (8.0, (4, 5)), (9.0, (4, 5))])
+def test_servos_that_lean_a_rotor_or_its_stream_are_no_motors(frame, rotors):
+    """A tail servo has the number of motor 7, the flaps of a ducted fan those of 1 to 4."""
+    channels = (0, 1, 3, 6) if frame == 7.0 else range(6)
+    functions = {f"SERVO{n + 1}_FUNCTION": 33.0 + n for n in channels}
+    outputs = Stream(np.arange(3.0), np.full((3, 8), 1500.0))
+    built = functions | {"FRAME_CLASS": frame}
+    assert Signals(outputs=outputs, parameters=built).motors == rotors
+    hexa = functions | {"FRAME_CLASS": 2.0}
+    assert Signals(outputs=outputs, parameters=hexa).motors == tuple(channels)

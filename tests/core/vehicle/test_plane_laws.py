@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
+from onboard.core.vehicle.signals import Signals, Stream
 from tests.core.vehicle.flights import plane_flight
 from tests.core.vehicle.planes import matched, names
 
@@ -103,3 +105,33 @@ def test_a_file_may_have_no_induced_drag():
     match = matched(flight)
     assert names(match) == {"drag"}
     assert PlaneAirframe.of(match.frame).induced < 0.2 * PlaneAirframe().induced
+
+
+def outputs_of(functions, us, reversed_=()):
+    """Commands of a plane whose channels have these functions, and pulse widths."""
+    parameters = {f"SERVO{n}_FUNCTION": f for n, f in functions.items()}
+    parameters |= {f"SERVO{n}_REVERSED": 1.0 for n in reversed_}
+    t = 0.1 * np.arange(us.shape[0])
+    return plane_commands(Signals(outputs=Stream(t, us), parameters=parameters, kind="plane")).x
+
+
+def test_a_v_tail_is_a_rudder_and_an_elevator():
+    """Its rudder was none, and a third of the side force was told with a sigma of a twentieth."""
+    rng = np.random.default_rng(1)
+    throttle, rudder, elevator = rng.uniform(-400.0, 400.0, (3, 50))
+    left, right = 0.5 * (elevator + rudder), 0.5 * (elevator - rudder)
+    functions = {1: 4.0, 2: 80.0, 3: 70.0, 4: 79.0}
+    us = 1500.0 + np.column_stack([0.0 * left, -right, throttle, left])
+    got = outputs_of(functions, us, reversed_=(2,))
+    assert got[:, 1] == pytest.approx(0.5 * rudder / 500.0)
+    assert got[:, 2] == pytest.approx(0.5 * elevator / 500.0)
+
+
+def test_elevons_are_an_elevator_and_no_rudder():
+    rng = np.random.default_rng(2)
+    throttle, aileron, elevator = rng.uniform(-400.0, 400.0, (3, 50))
+    left, right = 0.5 * (elevator - aileron), 0.5 * (elevator + aileron)
+    us = 1500.0 + np.column_stack([-right, -left, throttle])
+    got = outputs_of({1: 78.0, 2: 77.0, 3: 70.0}, us, reversed_=(1, 2))
+    assert not got[:, 1].any()
+    assert got[:, 2] == pytest.approx(0.5 * elevator / 500.0)

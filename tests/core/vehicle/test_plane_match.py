@@ -14,7 +14,7 @@ from onboard.core.vehicle.matching import deviance, likelier
 from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.several import joined
-from tests.core.vehicle.flights import STEP, G, plane_flight
+from tests.core.vehicle.flights import STEP, G, plane_flight, smooth
 from tests.core.vehicle.planes import SIGMA, matched, names
 
 pytestmark = pytest.mark.slow
@@ -354,3 +354,17 @@ def test_turns_tell_the_wind_from_a_heading_that_is_off():
         assert number.sigma < 0.15
     off = match.numbers["turned_down"]
     assert abs(abs(off.real) - 0.04) < 4.0 * off.sigma
+
+
+@pytest.mark.parametrize(("reads", "since"), [(347.0, 100.0), (3.0, 140.0)])
+def test_a_sensor_that_fails_in_flight_is_no_gust(reads, since):
+    """Gusts of 172 m/s had explained it, and the flight alone was four times as far off."""
+    flight = plane_flight(wind=(3.0, -2.0), reading=1.0, seed=4)
+    rng = np.random.default_rng(2)
+    wanders = reads + smooth(rng, len(flight), 0.5, 20.0)
+    late = flight.t > flight.t[0] + since
+    match = matched(replace(flight, airspeed=np.where(late, wanders, flight.airspeed)))
+    assert names(match) == {"wind"}
+    assert match.explained
+    assert "airspeed sensor reads what the force of the wing contradicts" in match.note
+    assert "airspeed_scale" in {n.name for n in match.not_testable}

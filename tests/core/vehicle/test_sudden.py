@@ -85,6 +85,19 @@ def test_a_battery_that_nobody_measured_is_no_sudden_change(lowest):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("by", "seed"), [((4.7, 1.7), 11), ((-3.0, 5.0), 12)])
+def test_a_front_is_a_wind_that_becomes_another_and_no_other_vehicle(by, seed):
+    """Mass and thrust that were less by half had been named beside a mean of the two winds."""
+    before = np.array([3.75, 1.37])
+    match = matched(copter_flight(wind=before, front=(100.0, by), seed=seed))
+    assert names(match) == {"wind"}
+    assert "the wind became another" in match.note
+    # By straight lines over minutes the ends are told to some tenths of a metre a second.
+    assert np.asarray(match.wind.law[0]) == pytest.approx(before, abs=0.5)
+    assert np.asarray(match.wind.law[-1]) == pytest.approx(before + by, abs=0.5)
+
+
+@pytest.mark.slow
 def test_in_one_of_several_flights_the_others_are_left_as_they_are():
     flights = [copter_flight(seed=6), copter_flight(mass=(100.0, 1.15), seed=7)]
     match = match_copter(

@@ -1,4 +1,4 @@
-"""A wind that becomes another one over minutes."""
+"""A wind that becomes another one, over minutes or at a moment."""
 
 from __future__ import annotations
 
@@ -25,16 +25,23 @@ PLAUSIBLE_M_S = 3.0
 
 
 class WindChange(Effect):
-    """Straight lines from moment to moment, without their mean, which is the wind's.
+    """Straight lines from moment to moment, or two levels, without their mean, the wind's.
 
     Beside the effects: the wind of a flight is its mean.
     """
 
-    def __init__(self, flight: Flight, *, name: str = "") -> None:
-        """Take a single flight; by the name it is asked about."""
+    def __init__(self, flight: Flight, *, name: str = "", moment: float | None = None) -> None:
+        """Take a single flight; by the name it is asked about.
+
+        Args:
+            flight: a single one.
+            name: by which it is asked about.
+            moment: at which one wind gives way to another, s on the boot clock; None: none does.
+        """
         self.name = name
+        self._moment = moment
         lasted = float(flight.t[-1] - flight.t[0])
-        count = min(int(lasted / EVERY_S), MOST) + 1
+        count = 2 if moment is not None else min(int(lasted / EVERY_S), MOST) + 1
         self._knots: Array = flight.t[0] + np.linspace(0.0, lasted, count)
         self._mean = self._shares(flight).mean(axis=0)
         super().__init__(
@@ -47,6 +54,9 @@ class WindChange(Effect):
 
     def _shares(self, flight: Flight) -> Array:
         """(n, count) of each moment's wind at the steps."""
+        if self._moment is not None:
+            after = flight.t >= self._moment
+            return np.column_stack([~after, after]).astype(float)
         unit = np.eye(len(self._knots))
         return np.stack([np.interp(flight.t, self._knots, row) for row in unit], axis=1)
 
@@ -61,6 +71,7 @@ class WindChange(Effect):
         air.wind_n[:, :2] += self.wind(air.flight, values)
 
     def missing(self, air: Air) -> str:
-        """It takes two of its spans, and one flight."""
+        """It takes two of its spans, or a moment, and one flight."""
         lasted = float(air.flight.t[-1] - air.flight.t[0])
-        return "" if air.flight.parts == 1 and lasted >= 2.0 * EVERY_S else "too short for it"
+        enough = self._moment is not None or lasted >= 2.0 * EVERY_S
+        return "" if air.flight.parts == 1 and enough else "too short for it"
