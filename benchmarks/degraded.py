@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.dcm_attitude import by_dcm
 from benchmarks.recorded import WHERE, Array, Flight, answered, flown, folder, in_force, recorded
 from onboard.core.estimate.result import Status
 from onboard.core.inputs.samples import (
@@ -175,6 +176,8 @@ LOSSES = (
     _all("GPS at 1 Hz", _thinned(GpsFix, 1.0)),
     _all("attitude at 10 Hz", _thinned(AttitudeSample, 10.0)),
     _all("attitude at 4 Hz", _thinned(AttitudeSample, 4.0)),
+    _all("attitude by DCM", by_dcm),
+    _all("attitude by DCM, 10 Hz", by_dcm, _thinned(AttitudeSample, 10.0)),
     _all("no vertical velocity", _changed(_no_vertical)),
     _all("0.3 m/s more noise of the receiver", _noisy),
     _all("no height", _changed(_no_height)),

@@ -43,7 +43,7 @@ from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged
 from onboard.core.maths.medians import middle
-from onboard.core.model import ekf3
+from onboard.core.model import autopilot_attitude
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
@@ -172,7 +172,7 @@ class Engine(Watched):
         run = slice(fresh[-1] if fresh else 0, None)
         known = self.batches[run]
         joined = self._heading.joined(known, batch)
-        self.batches[run] = ekf3.along(known, joined, self.batches[: run.start])
+        self.batches[run] = autopilot_attitude.along(known, joined, self.batches[: run.start])
         self._waiting += 1
         self._solution = None
         self._buffered_s += batch.duration

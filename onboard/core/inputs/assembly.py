@@ -347,10 +347,8 @@ def _attitude(angles: Array, parameters: ParametersInForce, streams: Streams) ->
     """Attitude of the accelerometer's body axes from the reported angles (k, 3), rad."""
     if streams.turned:
         return ReportedAttitude(angles, parameters.trim, turned=True)
-    # Firmware that has trims but no choice of EKF is older than the EKFs.
-    old = "AHRS_TRIM_X" in parameters.values and "AHRS_EKF_TYPE" not in parameters.values
-    if old or parameters.get("AHRS_EKF_TYPE", default=3.0) == 0.0:
-        return ReportedAttitude(angles, parameters.trim, by_dcm=True)
+    if (gain := parameters.dcm_gain) is not None:
+        return ReportedAttitude(angles, parameters.trim, dcm_gain=gain)
     pitch_trim = 0.0
     if streams.over_mavlink and not int(parameters.get("FLIGHT_OPTIONS", default=0.0)) & 0x100:
         pitch_trim = float(np.deg2rad(parameters.get("PTCH_TRIM_DEG", default=0.0)))

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from onboard.core.inputs.reported_attitude import DCM_GAIN
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Array, vector3
 from onboard.core.maths.board_orientation import board_rotation, is_axis_aligned
@@ -174,6 +175,19 @@ class ParametersInForce:
             self.get("AHRS_TRIM_Y", default=0.0),
             self.get("AHRS_TRIM_Z", default=0.0),
         )
+
+    @property
+    def dcm_gain(self) -> float | None:
+        """AHRS_RP_P, 1/s, where DCM finds the attitude; None: an EKF does.
+
+        Firmware that has trims but no choice of EKF is older than the choice; the first EKF could
+        be switched on (AHRS_EKF_USE).
+        """
+        if "AHRS_EKF_TYPE" in self.values:
+            by_dcm = self.values["AHRS_EKF_TYPE"] == 0.0
+        else:
+            by_dcm = "AHRS_TRIM_X" in self.values and not self.get("AHRS_EKF_USE", default=0.0)
+        return self.get("AHRS_RP_P", default=DCM_GAIN) if by_dcm else None
 
     @property
     def antenna(self) -> Array:

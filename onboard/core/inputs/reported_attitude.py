@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from onboard.core.maths.frames import (
     untrimmed_rotation_quaternion,
 )
 
+DCM_GAIN: Final = 0.2
+"""1/s: AHRS_RP_P and AHRS_YAW_P where nobody has set them [physics]."""
+
 
 @dataclass(frozen=True, slots=True)
 class ReportedAttitude:
@@ -24,14 +27,14 @@ class ReportedAttitude:
         angles: (k, 3) roll, pitch, yaw as reported, rad.
         trim: the autopilot's, rad.
         pitch_trim: see :func:`~onboard.core.maths.frames.untrimmed_rotation`.
-        by_dcm: whether DCM reports it, not an EKF.
+        dcm_gain: AHRS_RP_P, 1/s, where DCM reports it; None: an EKF does.
         turned: whether the trim was taken off by turning the body; no pitch trim is, then.
     """
 
     angles: Array
     trim: Vector3
     pitch_trim: float = 0.0
-    by_dcm: bool = False
+    dcm_gain: float | None = None
     turned: bool = False
 
     def __len__(self) -> int:
@@ -42,7 +45,7 @@ class ReportedAttitude:
         roll, pitch, yaw = self.angles[some].T
         if self.turned:
             return untrimmed_rotation_quaternion(roll, pitch, yaw, self.trim)
-        if self.by_dcm:
+        if self.dcm_gain is not None:
             return untrimmed_rotation_dcm(roll, pitch, yaw, self.trim)
         return untrimmed_rotation(roll, pitch, yaw, self.trim, self.pitch_trim)
 

@@ -9,23 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Final, Self
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import skew
 from onboard.core.maths.kalman_errors import FIRST, kalman_errors
 from onboard.core.maths.leaky import leaky_integral
+from onboard.core.model.sensor_errors import ERRORS, GRAVITY, Steps
 
-SCALE, BETA, LATENESS = [0, 1, 2], [3, 4, 5], [6]
-GYRO_SCALE, ANTENNA = [7, 8, 9], [10, 11, 12]
-"""Errors, by columns: what the accelerometer reads too much, by share (1) and at any force (m/s^2);
-how much older velocities are than it takes them for (s); what the gyroscope reads too much (1); how
-far the antenna is from where it takes it to be, body (m)."""
-ERRORS: Final = 13
 SIZE: Final = 15
 """States: attitude (rad), velocity (m/s) and place (m), NED; biases of accelerometer and gyroscope,
 body."""
@@ -46,7 +41,13 @@ it takes no receiver's word, and a compass's 0.05 of a field of half a gauss ten
 SHOWN_S: Final = 0.3
 """s in which what it reports takes over a correction: twice the delay of what it fuses, 0.12 to 0.2
 [physics]."""
-GRAVITY: Final = np.array([0.0, 0.0, STANDARD_GRAVITY])
+BEGINS: Final = np.repeat([0.1, 0.3, 0.5, 0.2, 0.005], 3)
+"""Sigmas with which it begins [physics]."""
+SETTLED_S: Final = 60.0
+"""It has been at rest for as long where a flight begins [physics: its own checks take half]; pauses
+in the air are shorter."""
+REST_STEP_S: Final = 0.1
+"""Of its steps at rest, s [cost]."""
 
 
 @dataclass(slots=True)
@@ -87,38 +88,29 @@ class State:
         return type(self)(both @ self.x, both @ self.P @ both.T, shown, told_n)
 
 
-@dataclass(frozen=True, slots=True)
-class Steps:
-    """n steps in a row.
+class Ekf3:
+    """The filter."""
 
-    Attributes:
-        h: (n,) s.
-        R: (n, 3, 3) mean attitude.
-        a_n: (n, 3) mean acceleration, NED, m/s^2.
-        pushed: (n, 9, m) what errors add to attitude, velocity and place.
-        told_n: (n, 3, m) how much too slow velocities are that it is told, NED, m/s.
-    """
+    def at_rest(self, R_bs: Array) -> Array:
+        """After a minute at rest."""
+        return _at_rest(tuple(R_bs.ravel().tolist()))
 
-    h: Array
-    R: Array
-    a_n: Array
-    pushed: Array
-    told_n: Array
+    def headed(self, states: Array, R: Array) -> Array:
+        """The same with another heading: R (3, 3)."""
+        turned = State.unpacked(states).turned(R)
+        return turned.packed(turned.unshown, turned.told_n)
 
-    def through(self, state: State, stop_after: Sequence[int]) -> tuple[Array, list[Array]]:
-        """The attitude that is reported, before and after each step, and states after some.
-
-        Args:
-            state: to begin with; its arrays go on to the end.
-            stop_after: how many steps, in order, all of them at last.
-
-        Returns:
-            (n + 1, 3 m), and packed states.
-        """
-        moves, noise, variance = self._filter()
-        pushed, told_n = self.pushed.copy(), self.told_n.reshape(len(self.h), -1)
+    def through(
+        self, steps: Steps, states: Array, stop_after: Sequence[int]
+    ) -> tuple[Array, list[Array]]:
+        """The attitude before and after each step, and states after some."""
+        state = State.unpacked(states)
+        moves, noise, variance = _filter(steps)
+        told_n = steps.told_n.reshape(len(steps.h), -1)
         slower = np.diff(np.vstack([state.told_n, told_n]), axis=0)
-        pushed[:, 3:6] += slower.reshape(self.told_n.shape)
+        pushed = np.zeros((len(steps.h), MOVED, ERRORS))
+        pushed[:, :3] = steps.turned
+        pushed[:, 3:6] = steps.force + slower.reshape(-1, 3, ERRORS)
         attitude, kept = [state.x[None, :FIRST].copy()], []
         for k, stop in pairwise([0, *stop_after]):
             cut = slice(k, stop)
@@ -126,22 +118,36 @@ class Steps:
             attitude.append(kalman_errors(*given, state.x, state.P))
             kept.append(state.packed(state.unshown, told_n[stop - 1]))
         whole = np.concatenate(attitude)
-        corrected = (np.diff(whole, axis=0) - pushed[:, :3]).reshape(len(self.h), -1)
-        t = np.concatenate([[0.0], np.cumsum(self.h)])
+        corrected = (np.diff(whole, axis=0) - pushed[:, :3]).reshape(len(told_n), -1)
+        t = np.concatenate([[0.0], np.cumsum(steps.h)])
         pole = np.full(corrected.shape[1], -1.0 / SHOWN_S)
         unshown = leaky_integral(t, corrected, pole, state.unshown)
         for stop, row in zip(stop_after, kept, strict=True):
             row[-2 * len(pole) : -len(pole)] = unshown[stop]
         return whole.reshape(unshown.shape) - unshown, kept
 
-    def _filter(self) -> tuple[Array, Array, Array]:
-        """Of each step, what moves errors, noise, and variances of what is observed."""
-        h = self.h[:, None]
-        push, R = skew((self.a_n - GRAVITY) * h), self.R * h[..., None]
-        moves = np.zeros((len(h), MOVED, SIZE))
-        moves[:, :3, 12:] = -R
-        moves[:, 3:6, :3] = -push
-        moves[:, 3:6, 9:12] = -R
-        moves[:, 3:6, 12:] = 0.5 * push @ R
-        moves[:, 6:, 3:6] = np.eye(3) * h[..., None]
-        return moves, h * NOISE, SIGMA**2 * (FUSED_S / h)
+
+@lru_cache(maxsize=4)
+def _at_rest(R_bs: tuple[float, ...]) -> Array:
+    """The state of a filter that was levelled at rest, its nose to the north, packed."""
+    n = round(SETTLED_S / REST_STEP_S)
+    steps = Steps.at_rest(np.reshape(R_bs, (3, 3)), n, REST_STEP_S)
+    force = steps.force[0] / REST_STEP_S
+    x = np.zeros((SIZE, ERRORS))
+    x[0], x[1] = force[1] / -GRAVITY[2], force[0] / GRAVITY[2]
+    nothing = np.zeros(3 * ERRORS)
+    begun = State(x, np.diag(BEGINS**2), nothing, nothing)
+    return Ekf3().through(steps, begun.packed(nothing, nothing), [n])[1][0]
+
+
+def _filter(steps: Steps) -> tuple[Array, Array, Array]:
+    """Of each step, what moves errors, noise, and variances of what is observed."""
+    h = steps.h[:, None]
+    push, R = skew(steps.f_n * h), steps.R * h[..., None]
+    moves = np.zeros((len(h), MOVED, SIZE))
+    moves[:, :3, 12:] = -R
+    moves[:, 3:6, :3] = -push
+    moves[:, 3:6, 9:12] = -R
+    moves[:, 3:6, 12:] = 0.5 * push @ R
+    moves[:, 6:, 3:6] = np.eye(3) * h[..., None]
+    return moves, h * NOISE, SIGMA**2 * (FUSED_S / h)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from onboard.core.model import ekf3, ekf3_filter
+from onboard.core.model import autopilot_attitude, sensor_errors
 from onboard.core.model.around import Around
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
@@ -16,10 +16,10 @@ ANTENNA_M: Final = 0.5
 """m by which an antenna is away from where an EKF takes it to be: most are not told, and it is
 somewhere on the vehicle [physics]."""
 TOLD: Final = (
-    *ekf3_filter.LATENESS,
-    *ekf3_filter.ANTENNA,
-    *ekf3_filter.SCALE,
-    *ekf3_filter.BETA,
+    *sensor_errors.LATENESS,
+    *sensor_errors.ANTENNA,
+    *sensor_errors.SCALE,
+    *sensor_errors.BETA,
 )
 """Columns of these unknowns."""
 
@@ -51,7 +51,7 @@ class EkfSensors(Family):
 
     def attitude(self, around: Around) -> Direct:
         """Of these errors."""
-        told = around.now.slow(ekf3.TILTED)
+        told = around.now.slow(autopilot_attitude.TILTED)
         if told is None:
             return NOTHING
-        return Direct(ned=told.reshape(-1, 3, ekf3_filter.ERRORS)[..., TOLD])
+        return Direct(ned=told.reshape(-1, 3, sensor_errors.ERRORS)[..., TOLD])

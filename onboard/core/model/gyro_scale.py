@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.model import ekf3, ekf3_filter
+from onboard.core.model import autopilot_attitude, sensor_errors
 from onboard.core.model.around import Around
 from onboard.core.model.nuisances import AXIS
 from onboard.core.model.quadrature import OfSensors, Signals
@@ -38,7 +38,7 @@ class GyroScale(Family):
     def attitude(self, around: Around) -> Direct:
         """What an EKF makes of it, if the recorded attitude follows this gyroscope."""
         now = around.now
-        told = now.slow(ekf3.TILTED) if now.segment.gyro_followed else None
+        told = now.slow(autopilot_attitude.TILTED) if now.segment.gyro_followed else None
         if told is None:
             return NOTHING
-        return Direct(ned=told.reshape(-1, 3, ekf3_filter.ERRORS)[..., ekf3_filter.GYRO_SCALE])
+        return Direct(ned=told.reshape(-1, 3, sensor_errors.ERRORS)[..., sensor_errors.GYRO_SCALE])

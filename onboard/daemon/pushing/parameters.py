@@ -40,6 +40,7 @@ FIRST = REQUIRED[:7]
 MEANING = (
     "AHRS_ORIENTATION",
     "AHRS_EKF_TYPE",
+    "AHRS_RP_P",
     "AHRS_TRIM_X",
     "AHRS_TRIM_Y",
     "AHRS_TRIM_Z",

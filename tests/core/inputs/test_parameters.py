@@ -97,3 +97,20 @@ def test_a_flight_in_which_the_board_is_said_to_be_turned_is_what_it_is_without(
     without, with_it = calibrated(None), calibrated(2.0)
     assert with_it.calibration(1).offset == without.calibration(1).offset
     assert with_it.calibration(1).scale == without.calibration(1).scale
+
+
+@pytest.mark.parametrize(
+    ("values", "gain"),
+    [
+        ({}, None),
+        ({"AHRS_TRIM_X": 0.0, "AHRS_EKF_TYPE": 3.0, "AHRS_RP_P": 0.2}, None),
+        ({"AHRS_TRIM_X": 0.0, "AHRS_EKF_TYPE": 0.0, "AHRS_RP_P": 0.1}, 0.1),
+        ({"AHRS_TRIM_X": 0.0, "AHRS_EKF_TYPE": 0.0}, 0.2),
+        ({"AHRS_TRIM_X": 0.0, "AHRS_EKF_USE": 0.0, "AHRS_RP_P": 0.4}, 0.4),
+        ({"AHRS_TRIM_X": 0.0, "AHRS_EKF_USE": 1.0, "AHRS_RP_P": 0.4}, None),
+        ({"AHRS_TRIM_X": 0.0, "AHRS_RP_P": 0.1}, 0.1),
+    ],
+)
+def test_who_finds_the_attitude(values, gain):
+    """Before there was a choice of EKF it was DCM, unless the first one was switched on."""
+    assert ParametersInForce(dict(values)).dcm_gain == gain

@@ -8,21 +8,21 @@ import pytest
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 from onboard.core.maths.earth import STANDARD_GRAVITY as G
 from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
-from onboard.core.model import ekf3
+from onboard.core.model import autopilot_attitude
 from onboard.core.model.around import around
-from onboard.core.model.ekf3_filter import (
+from onboard.core.model.ekf3_filter import SETTLED_S, SHOWN_S
+from onboard.core.model.ekf_sensors import TOLD, EkfSensors
+from onboard.core.model.gyro_scale import GyroScale
+from onboard.core.model.quadrature import NodeMaker
+from onboard.core.model.regressors import Model
+from onboard.core.model.sensor_errors import (
     ANTENNA,
     BETA,
     ERRORS,
     GYRO_SCALE,
     LATENESS,
     SCALE,
-    SHOWN_S,
 )
-from onboard.core.model.ekf_sensors import TOLD, EkfSensors
-from onboard.core.model.gyro_scale import GyroScale
-from onboard.core.model.quadrature import NodeMaker
-from onboard.core.model.regressors import Model
 from sitl.builtin import attitude
 
 STEP = attitude.STEP
@@ -109,7 +109,7 @@ def their_own(j):
 
 def ours(segment, t, before=None):
     """(k, 3, 13)"""
-    times, told = ekf3.followed(segment, before or {})[ekf3.TILTED]
+    times, told = autopilot_attitude.followed(segment, before or {})[autopilot_attitude.TILTED]
     return np.stack([np.interp(t, times, x) for x in told.T], axis=-1).reshape(-1, 3, ERRORS)
 
 
@@ -127,7 +127,7 @@ def test_an_error_tilts_it_as_far_as_another_ekf(theirs, j, every):
 def test_it_goes_on_from_segment_to_segment():
     at = np.array([22.0, 25.0, 30.0, 38.0])
     whole = ours(segment_of(0.0, 60.0), at)
-    before = ekf3.followed(segment_of(0.0, 22.0), {})
+    before = autopilot_attitude.followed(segment_of(0.0, 22.0), {})
     after = segment_of(20.0, 40.0)
     np.testing.assert_allclose(ours(after, at, before), whole, atol=2e-3)
     assert np.abs(ours(after, at) - whole).max() > 0.02
@@ -135,7 +135,7 @@ def test_it_goes_on_from_segment_to_segment():
 
 def test_over_a_pause_it_goes_on_with_what_it_has_learned():
     """Levelled at rest it would be tilted by an offset, which it has learned in the air."""
-    before = ekf3.followed(segment_of(0.0, 15.0), {})
+    before = autopilot_attitude.followed(segment_of(0.0, 15.0), {})
     at = np.arange(20.5, 34.0, 0.5)
     want = ours(segment_of(0.0, 60.0), at)
     on, anew = ours(segment_of(20.0, 40.0), at, before), ours(segment_of(20.0, 40.0), at)
@@ -150,13 +150,13 @@ def test_a_pause_in_the_air_is_none_of_the_ekf(flying, pause):
     speed = 8.0 if flying else 1.0
     first, second = batch_of(0.0, 20.0), batch_of(20.0, 40.0)
     fixes = [replace(b.fixes, v_n=b.fixes.v_n + speed) for b in (first, second)]
-    (flown,) = ekf3.along([], [replace(first, fixes=fixes[0])])
+    (flown,) = autopilot_attitude.along([], [replace(first, fixes=fixes[0])])
     t = second.segment.t
     later = replace(second.segment, t=t + pause, t_attitude=second.segment.t_attitude + pause)
     after = replace(second, segment=later, fixes=fixes[1], fresh=True)
-    (goes_on,), (rested,) = (ekf3.along([], [after], x) for x in ([flown], []))
-    got, anew = (b.segment.slow[ekf3.TILTED][1] for b in (goes_on, rested))
-    assert np.array_equal(got, anew) is not (flying and pause < ekf3.SETTLED_S)
+    (goes_on,), (rested,) = (autopilot_attitude.along([], [after], x) for x in ([flown], []))
+    got, anew = (b.segment.slow[autopilot_attitude.TILTED][1] for b in (goes_on, rested))
+    assert np.array_equal(got, anew) is not (flying and pause < SETTLED_S)
 
 
 def test_a_gap_in_the_attitudes_is_forgotten():
@@ -192,7 +192,7 @@ def test_levelled_at_rest_it_tilts_by_the_offset_and_learns_the_one_along_gravit
 
 def test_a_segment_without_attitudes_shows_nothing():
     few = segment_of(10.0, 10.2, every=10)
-    assert ekf3.followed(few, {}) == {}
+    assert autopilot_attitude.followed(few, {}) == {}
     maker = NodeMaker(segment_of(0.0, 20.0), np.zeros(3), np.repeat([1.0, 0.0], 3))
     assert EkfSensors().attitude(around(maker, np.array([5.0]))).ned is None
 
@@ -202,7 +202,7 @@ def test_families_have_their_columns_of_it(own):
     """The gyroscope's only where the attitude is turned by it."""
     model = Model([GyroScale(), EkfSensors()])
     segment = segment_of(0.0, 40.0, own=own)
-    made = replace(segment, slow=ekf3.followed(segment, {}))
+    made = replace(segment, slow=autopilot_attitude.followed(segment, {}))
     epochs = np.array([15.0, 15.2, 15.4])
     maker = NodeMaker(made, np.zeros(3), np.repeat([1.0, 0.0], 3))
     got = model.regressors(maker.intervals(epochs[:-1], epochs[1:]), around(maker, epochs))
@@ -225,19 +225,25 @@ def test_a_flight_is_followed_batch_by_batch():
     run: list[Batch] = []
     for k, part in enumerate(parts):
         known = run
-        run = ekf3.along(known, [*known, part])
+        run = autopilot_attitude.along(known, [*known, part])
         assert all(a is b for a, b in zip(run[: k - 1], known[: k - 1], strict=True))
     at = np.array([5.0, 15.0])
     for batch, start in zip(run, (0.0, 20.0, 40.0), strict=True):
-        told = batch.segment.slow[ekf3.TILTED]
+        told = batch.segment.slow[autopilot_attitude.TILTED]
         got = np.stack([np.interp(start + at, told[0], x) for x in told[1].T], axis=-1)
         want = ours(segment_of(0.0, 60.0), start + at).reshape(2, -1)
         np.testing.assert_allclose(got, want, atol=2e-3)
-    assert [ekf3.STATES in b.segment.slow for b in run] == [False, False, True]
+    assert [autopilot_attitude.STATES in b.segment.slow for b in run] == [False, False, True]
     turned = replace(run[0], segment=replace(run[0].segment, R_attitude=attitudes()[::2] @ BOARD))
-    again = ekf3.along(run, [turned, *run[1:]])
-    assert again[0].segment.slow[ekf3.TILTED][1].shape == run[0].segment.slow[ekf3.TILTED][1].shape
+    again = autopilot_attitude.along(run, [turned, *run[1:]])
     assert (
-        np.abs(again[0].segment.slow[ekf3.TILTED][1] - run[0].segment.slow[ekf3.TILTED][1]).max()
+        again[0].segment.slow[autopilot_attitude.TILTED][1].shape
+        == run[0].segment.slow[autopilot_attitude.TILTED][1].shape
+    )
+    assert (
+        np.abs(
+            again[0].segment.slow[autopilot_attitude.TILTED][1]
+            - run[0].segment.slow[autopilot_attitude.TILTED][1]
+        ).max()
         > 0.01
     )
