@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,11 @@ from onboard.core.inputs.limits import (
     KEPT_S,
     LEAST_LAG_S,
     LEAST_WAITING_S,
+    LONGEST_ROLL_S,
     MOST_STUCK,
     REACH_MARGIN_S,
     REACH_S,
+    ROLLED_OUT_S,
     SAME_M_S2,
     SAME_RAD_S,
     SLOWEST_IMU_HZ,
@@ -97,7 +100,8 @@ class Assembly:
     ) -> dict[int, list[Batch]]:
         """Batches of flight that are complete, by accelerometer; empty most of the time.
 
-        Where an autopilot says whether it has landed, the last seconds of flight wait for its word.
+        Where an autopilot says whether it has landed, the last seconds of flight wait for its word,
+        and so does what is still: of that it is heard later.
 
         Args:
             parameters: in force.
@@ -113,8 +117,10 @@ class Assembly:
         self.streams.settle()
         live = self.streams.live
         ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
-        if grounded is False:
-            ready = min(ready, touched) if everything else ready - TOUCHED_S
+        if grounded is False and not everything:
+            ready = min(ready - TOUCHED_S, self._stood())
+        elif grounded is False and touched < np.inf:
+            ready = min(ready, touched, self._stood())
         elif grounded is None and not everything:
             ready = min(ready, self._rolling.held(*waiting.motion(ready)))
         if min(ready, waiting.last) - waiting.first < least:
@@ -127,10 +133,16 @@ class Assembly:
         first, end = self._flown(live, fixes, grounded=grounded)
         if first > 0:
             self._continues.clear()  # what flies after it begins anew
+        flight, believed = fixes.between(first, end), trusted[first:end]
+        pieces = list(pairwise(_edges(flight.t, self._settings.batch_s))) if first < end else []
         for imu in live:
-            batches = self._cut(
-                imu, live, fixes.between(first, end), trusted[first:end], parameters
-            )
+            batches = [
+                batch
+                for a, b in pieces
+                for batch in self._cut(
+                    imu, live, flight.between(a, b + 1), believed[a : b + 1], parameters
+                )
+            ]
             if batches:
                 out[imu] = batches
         if end < len(t):
@@ -139,6 +151,17 @@ class Assembly:
         self.standing_s += float(t[-1] - t[0]) - flown
         self.streams.drop_before(float(t[-1]) - REACH_S - KEPT_S)
         return out
+
+    def _stood(self) -> float:
+        """Until when nothing is of the ground on which it stands now, s; inf if it does not.
+
+        What is still right before the word that it has landed is on the ground, for a hover comes
+        down first.  A fix from then on is of the touch-down, by its latency and by what it is
+        averaged over, and so are samples that are needed after one before.
+        """
+        fixes = self.streams.fixes
+        stands = ROLLED_OUT_S <= fixes.last - fixes.moved < LONGEST_ROLL_S
+        return fixes.moved - REACH_S - AHEAD_S if stands else np.inf
 
     def _flown(
         self, live: dict[int, ImuTrack], fixes: Fixes, *, grounded: bool | None
@@ -247,6 +270,19 @@ class Assembly:
             parameters.lever_arm(imu),
             followed,
         )
+
+
+def _edges(t: Array, batch_s: float) -> list[int]:
+    """Indices of first and last fixes of batches of flight at (n,) s; each ends where one begins.
+
+    What has waited for long is cut as it would have been: after ``batch_s``, if as much is left.
+    """
+    edges = [0]
+    while (cut := int(np.searchsorted(t, t[edges[-1]] + batch_s))) < len(t):
+        if t[-1] - t[cut] < batch_s:
+            break
+        edges.append(cut)
+    return [*edges, len(t) - 1]
 
 
 def _fixes(taken: Sequence[GpsFix], t: Array) -> Fixes:

@@ -63,7 +63,8 @@ FEWEST_FIXES: Final = 3
 TOUCHED_S: Final = 3.0
 """s before the autopilot's word that it has landed in which the vehicle may have touched the
 ground: detectors want a second of idling, at which a controller arrives in another one or two; an
-impact is no flight [physics]."""
+impact is no flight [physics].  They want a quiet force besides, for which they may wait in vain
+while rotors shake what stands: that shows in the velocity."""
 GROUND_M: Final = 2.0
 """m; heights closer than this to where the vehicle stood are the ground [data sheet: what a
 receiver's height scatters by in a minute or two]."""
@@ -77,8 +78,8 @@ FLYING_M_S: Final = 3.0
 ROLLED_OUT_S: Final = 2.0
 """s without speed after which a vehicle has come to a stand [probability: ten fixes in a row]."""
 LONGEST_ROLL_S: Final = 120.0
-"""s; nobody rolls for longer between two stands: what does is flown close to the ground
-[physics]."""
+"""s; nobody rolls for longer between two stands, nor stands with turning rotors for longer before
+that is said: what does is flown close to the ground, or hovers [physics]."""
 SILENT_S: Final = 2.0
 """s; an accelerometer that is so far behind the newest is not waited for [cost]."""
 LEAST_WAITING_S: Final = 0.5

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from onboard.core.inputs.blocks import ImuColumns
 from onboard.core.inputs.even_times import even_times
-from onboard.core.inputs.limits import BEFORE_NEXT_S, HIGHRES_S
+from onboard.core.inputs.limits import (
+    BEFORE_NEXT_S,
+    GROUND_M,
+    HIGHRES_S,
+    LONGEST_FIX_GAP_S,
+    STILL_M_S,
+)
 from onboard.core.inputs.rows import Rows
 from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
 from onboard.core.maths.accelerometer import SixParameters
@@ -212,11 +218,19 @@ def _reported(fix: GpsFix) -> tuple[float | None, ...]:
 
 
 class FixTrack:
-    """GPS fixes: repeats dropped, times put on the receiver's own even grid."""
+    """GPS fixes: repeats dropped, times put on the receiver's own even grid.
 
-    __slots__ = ("_fixes", "_last_even", "_offsets", "refused")
+    Attributes:
+        moved: stamp of the newest fix that shows motion, by speed or by height, or before which
+            there was an outage, s; -inf: there is none.
+    """
+
+    __slots__ = ("_fixes", "_height", "_last_even", "_offsets", "moved", "refused")
 
     def __init__(self) -> None:
+        self.moved = -np.inf
+        self._height = np.nan
+        """Where it was then, m; before that, where it was first."""
         self._fixes: list[tuple[GpsFix, bool]] = []
         self._offsets: list[tuple[float, float]] = []
         self._last_even = -np.inf
@@ -245,8 +259,21 @@ class FixTrack:
             if same or not fix.t > before.t:
                 self.refused["gps_repeated" if same or fix.t == before.t else "gps_late"] += 1
                 return False
+            if self._moves(fix, before):
+                self.moved, self._height = fix.t, fix.altitude
+        else:
+            self._height = fix.altitude
         self._fixes.append((fix, trusted))
         return True
+
+    def _moves(self, fix: GpsFix, before: GpsFix) -> bool:
+        still = (
+            math.hypot(fix.v_n, fix.v_e, fix.v_d or 0.0) < STILL_M_S
+            # Not every receiver tells how fast it sinks, and some land slowly.
+            and abs(fix.altitude - self._height) < GROUND_M
+            and fix.t - before.t < LONGEST_FIX_GAP_S
+        )
+        return not still
 
     def motion(self, until: float) -> tuple[Array, Array, Array]:
         """Of what waits up to ``until``: times, s, heights, m, and speeds over ground, m/s."""
@@ -280,4 +307,5 @@ class FixTrack:
     def clear(self) -> None:
         """Forget all fixes (reboot)."""
         self._fixes.clear()
-        self._last_even = -np.inf
+        self._last_even = self.moved = -np.inf
+        self._height = np.nan
