@@ -27,8 +27,9 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.mean_force import in_the_mean
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.estimate.standing import Standing
 from onboard.core.inputs.blocks import Block
-from onboard.core.inputs.samples import GpsFix, Sample
+from onboard.core.inputs.samples import GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.compiling import prefer_compiled
 
@@ -63,6 +64,7 @@ class Recorded:
         self._shift, self._newest, self._begins = 0.0, -math.inf, False
         self._recordings = [-math.inf]  # when each of them begins, on the clock of the first
         self._contradictions: dict[int, Contradiction] = {}
+        self._standing = Standing()
 
     @property
     def imus(self) -> tuple[int, ...]:
@@ -94,6 +96,8 @@ class Recorded:
             if self._shift:
                 sample = later(sample, t, self._shift)
             self._newest = max(self._newest, t + self._shift)
+        if isinstance(sample, ImuSample):
+            self._standing.hear_one(sample, self.calibrator.parameters)
         return self._reader.feed(sample)
 
     def feed_block(self, block: Block) -> object | None:
@@ -103,6 +107,11 @@ class Recorded:
         taken = self._reader.feed_block(block)
         if taken is not None:
             self._newest = max(self._newest, block.latest)
+            for columns in block.kept:
+                self._standing.catch_up(columns.imu, self.calibrator.parameters)
+                self._standing.hear(
+                    columns.imu, columns.t, columns.rows[:, :6], self.calibrator.parameters
+                )
         return taken
 
     def finish(self) -> object:
@@ -162,7 +171,7 @@ class Recorded:
         try:
             beside = next(iter(self._engines.values()), None)
             found = examine(self.calibrator, imu, beside=beside)
-            given = judged(found.diagnosis(), self.parameters)
+            given = judged(self._with_rest(found.diagnosis()), self.parameters)
             if self._one_of_several:
                 self._asked_of[imu] = asked_of(found.choice)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
@@ -179,6 +188,12 @@ class Recorded:
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine, found.left_open)
         return given
+
+    def _with_rest(self, found: Diagnosis) -> Diagnosis:
+        """With what the accelerometer reads at rest, which is no part of its estimate."""
+        c = found.calibration
+        at_rest = self._standing.of(c, self.calibrator.parameters)
+        return replace(found, calibration=replace(c, at_rest=at_rest))
 
 
 def later(sample: Sample, t: float, by: float) -> Sample:

@@ -50,6 +50,15 @@ class DeadReckoningDocument(msgspec.Struct, frozen=True, kw_only=True):
     windows: int
 
 
+class AtRestDocument(msgspec.Struct, frozen=True, kw_only=True):
+    """By how much more than gravity the accelerometer reads at rest, which is not in the fit."""
+
+    in_force_m_s2: float | None
+    estimate_m_s2: float | None
+    sigma_m_s2: float | None
+    seconds: float | None
+
+
 class CoverageDocument(msgspec.Struct, frozen=True, kw_only=True):
     """How far the flight excited the six, and what to fly next."""
 
@@ -108,6 +117,7 @@ class ImuDocument(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     residual: ResidualDocument
     certificate: CertificateDocument | None
     dead_reckoning: DeadReckoningDocument | None
+    at_rest: AtRestDocument | None
     coverage: CoverageDocument
     temperature: Number | None
     advice: AdviceDocument | msgspec.UnsetType = msgspec.UNSET
@@ -216,6 +226,7 @@ def imu_document(
         ),
         certificate=_certificate(c),
         dead_reckoning=_dead_reckoning(c),
+        at_rest=_at_rest(c),
         coverage=CoverageDocument(
             percent=finite(c.coverage.percent),
             per_parameter=dict(zip(SIX_NAMES, numbers(c.coverage.per_parameter), strict=True)),
@@ -253,4 +264,16 @@ def _dead_reckoning(calibration: Calibration) -> DeadReckoningDocument | None:
         drift_before_m_s=finite(d.drift_before),
         drift_after_m_s=finite(d.drift_after),
         windows=d.windows,
+    )
+
+
+def _at_rest(calibration: Calibration) -> AtRestDocument | None:
+    r = calibration.at_rest
+    if r is None:
+        return None
+    return AtRestDocument(
+        in_force_m_s2=finite(r.in_force),
+        estimate_m_s2=finite(r.estimate),
+        sigma_m_s2=finite(r.sigma),
+        seconds=finite(r.seconds),
     )

@@ -16,6 +16,7 @@ from onboard.answers.words import (
 )
 from onboard.core.diagnosis.excess import HEADING
 from onboard.core.diagnosis.records import Diagnosis, Unused, Verdict
+from onboard.core.estimate.result import Calibration
 from onboard.core.physics.catalogue import (
     danger_of,
     is_excluded,
@@ -163,7 +164,17 @@ def proof(diagnosis: Diagnosis) -> str:
     said += "."
     if diagnosis.ambiguous:
         said += " Some effects could not be told apart, see below."
-    return said
+    return f"{said} {at_rest(diagnosis.calibration)}".rstrip()
+
+
+def at_rest(calibration: Calibration) -> str:
+    """What the accelerometer reads where its vehicle stands; empty if nobody saw it standing."""
+    r = calibration.at_rest
+    if r is None:
+        return ""
+    now = f"{signed(r.estimate, 3)} ± {fixed(r.sigma, 3)} with the estimate"
+    off = f"{signed(r.in_force, 3)} m/s² as it is and {now}"
+    return f"At rest, which the fit did not use, the accelerometer is off gravity by {off}."
 
 
 def fall(before: float, after: float) -> str:

@@ -167,6 +167,9 @@ def _about(
             "without GPS",
             f"velocity off after {d.horizon_s:.0f} s: {drift} ({d.windows} windows)",
         )
+    if (r := c.at_rest) is not None:
+        off = f"{r.in_force:+.3f} m/s^2 as it is, {r.estimate:+.3f} ± {r.sigma:.3f} calibrated"
+        yield "at rest", f"off gravity by {off} (it stood for {r.seconds:.0f} s, not in the fit)"
     coverage = f"{c.coverage.percent:.0f} %"
     if c.coverage.weakest:
         coverage += f", weakest: {c.coverage.weakest}"

@@ -270,6 +270,9 @@ def _fits(c: Calibration) -> list[dict[str, Any]]:
     if c.dead_reckoning is not None and c.dead_reckoning.windows:
         d = c.dead_reckoning
         rows.append((f"Velocity after {d.horizon_s:.0f} s", "m/s", d.drift_before, d.drift_after))
+    if c.at_rest is not None:
+        off = abs(c.at_rest.in_force), abs(c.at_rest.estimate)
+        rows.append(("Off gravity at rest, not in the fit", "m/s²", *off))
     return [
         {
             "label": label,

@@ -165,6 +165,19 @@ WHOLE_SHARE: Final = 0.97
 FEWEST_INTERVALS: Final = 3
 """Intervals between fixes that a window must have [cost]."""
 
+# At rest (standing).
+
+STAND_S: Final = 2.0
+"""Stretches in which it is asked whether a vehicle stands, s: longer than an idling rotor's beat
+[physics]."""
+FEWEST_AT_REST: Final = 10
+FEWEST_STANDS: Final = 3
+"""Samples that such a stretch must have, and stretches that say something [cost]."""
+QUIET_M_S2: Final = 0.06
+QUIET_RAD_S: Final = 0.01
+"""Scatter of force and rates of a sensor at rest: a few times what it has by itself.  Of one whose
+motors run, or that somebody carries, it is ten times as much [data sheet]."""
+
 # Pairs of accelerometers (shared_windows, wandering, relative, joint, common_cause).
 
 SHARED_WINDOW_S: Final = 1.0

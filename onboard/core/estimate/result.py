@@ -69,6 +69,25 @@ class Coverage:
 
 
 @dataclass(frozen=True, slots=True)
+class AtRest:
+    """By how much more than gravity an accelerometer reads where its vehicle stands, m/s^2.
+
+    It is no part of the estimate: neither GPS nor attitude, timing or motion are in it.
+
+    Attributes:
+        in_force: with the parameters in force.
+        estimate: with the estimate.
+        sigma: of that, as the estimate claims.
+        seconds: that it stood.
+    """
+
+    in_force: float
+    estimate: float
+    sigma: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
     """The answer for one accelerometer.
 
@@ -120,6 +139,7 @@ class Calibration:
     predictive_gain: float = float("nan")
     certificate: Certificate | None = None
     dead_reckoning: DeadReckoning | None = None
+    at_rest: AtRest | None = None
     temperature: Estimate | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
