@@ -11,6 +11,7 @@ from onboard.core.vehicle.effects.wind import FLOOR_M_S
 from onboard.core.vehicle.effects.wind_profile import TOP_M
 from onboard.core.vehicle.limits import APART
 from onboard.core.vehicle.records import Difference, VehicleMatch
+from onboard.core.vehicle.signals import airspeed_ratio
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +53,12 @@ def settings_of(
         out.append(Setting("SIM_GPS1_LAG_MS", float(round(lag)), its, "gps_latency"))
     if "airspeed_scale" in named:
         value = named["airspeed_scale"].values["over_equivalent"]
-        told = recording.signals.parameters.get("ARSPD_RATIO", 2.0)
+        values = recording.signals.parameters
+        own = airspeed_ratio(values)
+        told = values.get(own, 2.0)
         ratio = told * (value.simulation / value.real) ** 2
         sigma = 2.0 * ratio * value.sigma / value.real
-        out.append(Setting("SIM_ARSPD_RATIO", ratio, sigma, "airspeed_scale"))
+        out.append(Setting(f"SIM_{own}", ratio, sigma, "airspeed_scale"))
     if "gps_lever_arm" in named:
         for axis in "xyz":
             value = named["gps_lever_arm"].values[axis]

@@ -13,6 +13,7 @@ from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 from onboard.core.vehicle.lift_rotors import turning
+from onboard.core.vehicle.signals import airspeed_ratio
 from onboard.errors import RecordingError, UsageError
 
 if TYPE_CHECKING:
@@ -150,11 +151,13 @@ def craft_of(result: Match) -> Airframe | Wing:
         if "thrust_scale" in names:
             ratio = next(d for d in v.effects if d.name == "thrust_scale").values["ratio"].real
             keys["hover_throttle"] = Wing().hover_throttle / ratio
-        ratios = [s.value for s in result.settings if s.name == "SIM_ARSPD_RATIO"]
+        values = result.real.signals.parameters
+        own = airspeed_ratio(values)
+        ratios = [s.value for s in result.settings if s.name == f"SIM_{own}"]
         if ratios:
             # The autopilot of the recording may have another ratio set than the built-in one has.
             usual = Wing().airspeed_ratio
-            told = result.real.signals.parameters.get("ARSPD_RATIO", usual)
+            told = values.get(own, usual)
             keys["airspeed_ratio"] = ratios[0] * usual / told
         return as_sitl(Wing.from_dict(keys), altitude_of(result))
     for effect, unknown, key in (

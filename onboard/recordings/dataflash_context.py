@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.views import tells_views
-from onboard.core.vehicle.signals import THROTTLE_FUNCTION, rotor_functions
+from onboard.core.vehicle.signals import (
+    THROTTLE_FUNCTION,
+    primary_airspeed,
+    rotor_functions,
+)
 from onboard.recordings.dataflash_formats import Format, Records
 from onboard.recordings.dataflash_index import DataflashIndex
 
@@ -37,8 +41,9 @@ class Context:
     measures one; ``ekf_status_from`` names the record of the EKF that flies; ``motor_channels`` are
     the outputs to take for throttle where the log has no better, ``motor_range_us`` their pulse
     widths at none and at full; ``attitude_from`` names the record of the attitude, ``of_view``
-    says whether it is not always the body's, and ``lanes`` has the times (n,) and numbers (n,) of
-    EKF3's primary lane; ``first_time`` (s) is given to records without a time that
+    says whether it is not always the body's, ``primary_airspeed`` is the number of the airspeed
+    sensor to take where records do not say which is used, and ``lanes`` has the times (n,) and
+    numbers (n,) of EKF3's primary lane; ``first_time`` (s) is given to records without a time that
     stand before all others.
     """
 
@@ -51,6 +56,7 @@ class Context:
     motor_range_us: tuple[float, float]
     attitude_from: str
     of_view: bool
+    primary_airspeed: int
     lanes: Series
     first_time: float
 
@@ -71,6 +77,7 @@ def context_of(index: DataflashIndex, first_time: float) -> Context:
         motor_range_us=_motor_range(parameters),
         attitude_from=EKF3_ATTITUDE if views and by_ekf3 else ATTITUDE,
         of_view=views and not by_ekf3,
+        primary_airspeed=primary_airspeed(parameters),
         lanes=_lanes(index),
         first_time=first_time,
     )

@@ -167,12 +167,16 @@ def outputs(batch: Batch, _context: Context) -> Converted:
     return samples_of(Outputs, batch.t.tolist(), values)
 
 
-def airspeed(batch: Batch, _context: Context) -> Converted:
-    """ARSP of the first sensor."""
-    values, sensor = batch.floats("Airspeed")[0], batch.integers("I")
+def airspeed(batch: Batch, context: Context) -> Converted:
+    """ARSP, and ASP2 of old logs: the sensor that is the primary one, as VFR_HUD has it."""
+    values, form = batch.floats("Airspeed")[0], batch.form
+    second = int(form.name == SECOND_AIRSPEED)
+    sensor = batch.integers("I", second)
+    told = "Primary" if form.has("Primary") else "Pri"
+    primary = batch.integers(told, context.primary_airspeed)
     return [
-        AirData(t, airspeed=v) if i == 0 else None
-        for t, v, i in zip(batch.t.tolist(), values, sensor, strict=True)
+        AirData(t, airspeed=v) if i == its else None
+        for t, v, i, its in zip(batch.t.tolist(), values, sensor, primary, strict=True)
     ]
 
 
@@ -282,6 +286,8 @@ FIRMWARE = {
 }
 IMU_NAMES = ("IMU", "IMU2", "IMU3")
 ATTITUDE_NAMES = (ATTITUDE, EKF3_ATTITUDE)
+SECOND_AIRSPEED = "ASP2"
+AIRSPEED_NAMES = ("ARSP", SECOND_AIRSPEED)
 CONVERTERS: dict[str, tuple[Converter, ...]] = {
     **dict.fromkeys(IMU_NAMES, (imu,)),
     **dict.fromkeys(GPS_NAMES, (gps,)),
@@ -289,7 +295,7 @@ CONVERTERS: dict[str, tuple[Converter, ...]] = {
     "VIBE": (vibration,),
     "CTUN": (throttle,),
     "RCOU": (motors, outputs),
-    "ARSP": (airspeed,),
+    **dict.fromkeys(AIRSPEED_NAMES, (airspeed,)),
     "XKF2": (ekf_bias, wind),
     "XKF4": (ekf_status,),
     "NKF4": (ekf_status,),
@@ -306,7 +312,7 @@ NEEDED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(GPS_NAMES, ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")),
     **dict.fromkeys(ATTITUDE_NAMES, ("Roll", "Pitch", "Yaw")),
     "VIBE": ("VibeX", "VibeY", "VibeZ"),
-    "ARSP": ("Airspeed",),
+    **dict.fromkeys(AIRSPEED_NAMES, ("Airspeed",)),
     "XKF2": ("VWN", "VWE"),
     "XKF4": ("SS",),
     "NKF4": ("SS",),

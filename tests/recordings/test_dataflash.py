@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.samples import (
+    AirData,
     AttitudeSample,
     Battery,
     GpsFix,
@@ -255,6 +256,31 @@ def test_the_attitude_is_the_body_s_where_att_is_of_a_view(tmp_path):
     (block,) = recording.gather()
     np.testing.assert_array_equal(block.attitude.t, [s.t for s in told])
     np.testing.assert_array_equal(block.attitude.angles, [(s.roll, s.pitch, s.yaw) for s in told])
+
+
+def test_the_airspeed_is_that_of_the_sensor_that_is_flown_by(tmp_path):
+    """The first one fails in flight, and the autopilot goes over to the second one and back."""
+    log = modern_log()
+    log.format(20, "ARSP", "QBffB", "TimeUS,I,Airspeed,DiffPress,Pri")
+    primary = [0, 0, 1, 1, 1, 0]
+    for k, its in enumerate(primary):
+        for sensor, speed in ((0, 20.0), (1, 25.0)):
+            log.add("ARSP", 5_000_000 + 100_000 * k, sensor, speed + k, 9.0, its)
+    path = saved(tmp_path, log)
+    told = [20.0 + 5.0 * its + k for k, its in enumerate(primary)]
+    assert [s.airspeed for s in of_type(path, AirData)] == told
+
+
+@pytest.mark.parametrize("column", ["Pri", "Primary", ""])
+def test_the_airspeed_of_old_logs_has_a_record_of_its_own_for_the_second_sensor(tmp_path, column):
+    log = modern_log()
+    columns = ("TimeUS,Airspeed", "QfB" if column else "Qf")
+    log.add("PARM", 5_000_000, "ARSPD_PRIMARY", 1.0, 0.0)
+    for kind, name, speed in ((20, "ARSP", 20.0), (21, "ASP2", 25.0)):
+        log.format(kind, name, columns[1], ",".join(filter(None, (columns[0], column))))
+        for k in range(3):
+            log.add(name, 5_000_000 + 100_000 * k, speed, *([1] if column else []))
+    assert [s.airspeed for s in of_type(saved(tmp_path, log), AirData)] == [25.0] * 3
 
 
 def test_it_is_said_where_the_log_has_the_view_s_only(tmp_path):

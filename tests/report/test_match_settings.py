@@ -12,6 +12,7 @@ from onboard.answers.match_settings import settings_of
 from onboard.answers.sensor_level import calibration_settings
 from onboard.core.estimate.result import Estimate, Status
 from onboard.core.maths.board_orientation import board_rotation
+from onboard.core.vehicle.records import Compared, Difference
 from tests.report.matches_by_hand import by_hand
 
 RECORDING = SimpleNamespace(derived=True)
@@ -43,6 +44,18 @@ def test_a_wind_errs_along_itself_in_speed_and_across_in_direction():
         assert told["SIM_WIND_SPD"].sigma == pytest.approx(gain * speeds.std(), rel=0.02)
         # A direction is no surer for a wind that is stronger higher up.
         assert told["SIM_WIND_DIR"].sigma == pytest.approx(turns.std(), rel=0.02)
+
+
+@pytest.mark.parametrize("primary", [0.0, 1.0])
+def test_the_ratio_is_that_of_the_airspeed_sensor_by_which_the_autopilot_flies(primary):
+    parameters = {"ARSPD_PRIMARY": primary, "ARSPD_RATIO": 1.8, "ARSPD2_RATIO": 2.2}
+    recording = SimpleNamespace(derived=True, signals=SimpleNamespace(parameters=parameters))
+    reads = Difference(
+        "airspeed_scale", "vehicle", {"over_equivalent": Compared(1.0, 1.1, 0.01, "1")}
+    )
+    (setting,) = settings_of(replace(by_hand().vehicle, wind=None), (), (reads,), recording)
+    assert setting.name == ("SIM_ARSPD2_RATIO" if primary else "SIM_ARSPD_RATIO")
+    assert setting.value == pytest.approx((2.2 if primary else 1.8) / 1.1**2)
 
 
 @pytest.mark.parametrize("orientation", [0, 2, 6, 8, 10, 12, 16, 20, 25, 26])

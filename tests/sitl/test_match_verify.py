@@ -110,12 +110,17 @@ def test_the_airframe_that_is_flown_has_the_keys_of_the_frame_file():
     assert craft.motor_vector == (0.06, 0.0, -1.0)
 
 
-def test_an_airspeed_sensor_errs_by_the_ratio_that_is_set_over_the_right_one():
+@pytest.mark.parametrize(
+    ("parameters", "name"),
+    [
+        ({"ARSPD_RATIO": 1.6}, "SIM_ARSPD_RATIO"),
+        ({"ARSPD_RATIO": 3.0, "ARSPD2_RATIO": 1.6, "ARSPD_PRIMARY": 1.0}, "SIM_ARSPD2_RATIO"),
+    ],
+)
+def test_an_airspeed_sensor_errs_by_the_ratio_that_is_set_over_the_right_one(parameters, name):
     """Set to 1.6 where 2.0 is right: the built-in autopilot has 2.0 set."""
-    real: Any = SimpleNamespace(
-        ground=0.0, signals=SimpleNamespace(parameters={"ARSPD_RATIO": 1.6})
-    )
-    setting = Setting("SIM_ARSPD_RATIO", 2.0, 0.01, "airspeed_scale")
+    real: Any = SimpleNamespace(ground=0.0, signals=SimpleNamespace(parameters=parameters))
+    setting = Setting(name, 2.0, 0.01, "airspeed_scale")
     match = replace(by_hand(vehicle="plane"), real=real, settings=(setting,), frame={})
     craft = craft_of(match)
     assert isinstance(craft, Wing)

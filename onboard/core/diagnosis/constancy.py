@@ -197,6 +197,40 @@ class Pieces:
         values = self.theta[own] + asked - back @ step
         return made, values, np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
 
+    def apart(self, index: Sequence[int]) -> Array:
+        """(P,) chi-square that each piece gains by values of its own of some unknowns."""
+        own = list(index)
+        C = np.linalg.inv(self.N.sum(axis=0) + np.diag(self.prior))
+        rows, s = self.N[:, own], self.s[:, own]
+        J = rows[:, :, own] - rows @ C @ rows.transpose(0, 2, 1)
+        told = np.linalg.eigvalsh(J)[:, 0] > ROUNDING * np.trace(rows[:, :, own].sum(axis=0))
+        J[~told] = np.eye(len(own))  # of which it knows nothing
+        gains: Array = np.einsum("pi,pi->p", s, np.linalg.solve(J, s[..., None])[..., 0])
+        return np.where(told, gains, 0.0)
+
+    def silenced(self, piece: int, index: Sequence[int]) -> Self:
+        """The same where one piece has values of its own of some unknowns, and tells none."""
+        own, N, s = list(index), self.N.copy(), self.s.copy()
+        K = np.linalg.inv(N[piece][np.ix_(own, own)])
+        cross = N[piece][:, own].copy()
+        asked = K @ s[piece, own]
+        known = float(len(own))
+        N[piece] -= cross @ K @ cross.T
+        s[piece] -= cross @ asked
+        N[piece, own], N[piece][:, own], s[piece, own] = 0.0, 0.0, 0.0
+        pull = -self.s.sum(axis=0)
+        total_N, total_s = N.sum(axis=0), s.sum(axis=0)
+        step = np.linalg.solve(total_N + np.diag(self.prior), total_s + pull)
+        fall = float(self.s[piece, own] @ asked) + step @ (2.0 * total_s - total_N @ step)
+        return replace(
+            self,
+            theta=self.theta + step,
+            N=N,
+            s=s - N @ step,
+            square=self.square - fall,
+            rows=self.rows - known,
+        )
+
     def held(self, index: int) -> Self:
         """The same with an unknown that stays as it is."""
         N, s = self.N.copy(), self.s.copy()

@@ -4,6 +4,13 @@ Of a latency that steps from flight to flight, clocks that run at different rate
 it, on flight that was not fitted, too.  So where a constant of a flight is surely or probably none
 (:mod:`onboard.core.diagnosis.constancy`), every effect is asked again with that constant free in
 every piece of the flight.  What then explains no more than chance was its shadow.
+
+*Within a piece.*  A constant that steps does so within a piece, where a number of its own is no
+more what it was than the one number was in the flight: growth makes the best of that step again,
+with all the lever of a step by tenths of a second in ten.  So what an effect is in a piece is asked
+to be what it is in the others, as constants are: where it is surprisingly another one there, that
+piece has a size of its own of it, and tells nothing of the effect.  An effect that is there loses
+no pieces but by chance, and those that are left know it.
 """
 
 from __future__ import annotations
@@ -47,7 +54,8 @@ def needless(pieces: Pieces, asked: Sequence[Candidate], absent: Array) -> list[
         asked: the effects, which are unknowns of the pieces.
         absent: (m,) values of the unknowns that mean that an effect is not there.
     """
-    variance = pieces.scatter(max(1.0, pieces.square / max(pieces.rows, 1.0)))
+    pieces = _agreeing(pieces, asked)
+    variance = _variance(pieces)
     A = pieces.N.sum(axis=0) + np.diag(pieces.prior)
     b = A @ pieces.theta
     free, kept, gone = np.ones(len(b), dtype=bool), list(asked), []
@@ -69,3 +77,24 @@ def needless(pieces: Pieces, asked: Sequence[Candidate], absent: Array) -> list[
         gone.append(worst)
         free[list(worst.index)] = False
     return gone
+
+
+def _agreeing(pieces: Pieces, asked: Sequence[Candidate]) -> Pieces:
+    """The same where no piece says of an effect what the others contradict."""
+    while asked:
+        variance, places = _variance(pieces), float(len(pieces.s))
+        found = [
+            (surprise(float(gain), len(c.index), places, variance), piece, c)
+            for c in asked
+            for piece, gain in enumerate(pieces.apart(c.index))
+        ]
+        score, piece, c = max(found, key=lambda f: f[0])
+        if score < least():
+            break
+        pieces = pieces.silenced(piece, c.index)
+    return pieces
+
+
+def _variance(pieces: Pieces) -> float:
+    """Of what the pieces differ by, over what the sums say."""
+    return pieces.scatter(max(1.0, pieces.square / max(pieces.rows, 1.0)))

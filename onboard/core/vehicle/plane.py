@@ -143,6 +143,7 @@ def plane_model(
     beyond: Sequence[str] = (),
     *,
     held: bool = False,
+    wind_from: float | None = None,
 ) -> ForceModel:
     """Every effect of a plane that this recording can speak of.
 
@@ -152,6 +153,7 @@ def plane_model(
         force_sigma: (3,) what the sensor level leaves unknown of the force, m/s^2; (parts, 3).
         beyond: keys of what repeats with the motion, or with time, and is no effect's.
         held: whether the side force is the file's.
+        wind_from: when the wind of a single flight became another at once, s; None: never.
     """
     sensor = has_airspeed(flight)
 
@@ -161,7 +163,7 @@ def plane_model(
     still = start(flight)
     everything: list[Effect] = [
         own([Wind(sigma) for sigma in wind_sigmas(flight)]),
-        *([WindChange(flight)] if CHANGE in beyond else []),
+        *([WindChange(flight, moment=wind_from)] if CHANGE in beyond else []),
         *([WindByHeight(flight)] if HEIGHT in beyond else []),
         own([WindProfile() for _ in range(flight.parts)]),
         *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,11 +16,15 @@ from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond_wings import WINGS
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.side_force import SideForce
+from onboard.core.vehicle.effects.wind_change import CHANGE, EVERY_S
 from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.front import front_of
 from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S, SURE
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, likelier, matched
+from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.plane import has_airspeed, plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
@@ -69,30 +73,75 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
     return told.beside(match)
 
 
+@dataclass(frozen=True, slots=True)
+class _Form:
+    """What a model has beside the effects.
+
+    Attributes:
+        beyond: keys of what repeats with the motion, or with time, and is no effect's.
+        wind_from: when the wind of a single flight became another at once, s; None: never.
+    """
+
+    beyond: tuple[str, ...] = ()
+    wind_from: float | None = None
+
+    def model(
+        self, flight: Flight, frame: PlaneAirframe, sigma: Array, *, held: bool = False
+    ) -> ForceModel:
+        """Of this form."""
+        return plane_model(flight, frame, sigma, self.beyond, held=held, wind_from=self.wind_from)
+
+    def turning(self, moment: float | None) -> _Form:
+        """The same in a wind that becomes another, at a moment, s, or over minutes."""
+        return _Form((*self.beyond, CHANGE), moment)
+
+
 def _found(
-    flight: Flight, frame: PlaneAirframe, force_sigma: Array, beyond: tuple[str, ...] = ()
+    flight: Flight, frame: PlaneAirframe, force_sigma: Array, form: _Form | None = None
 ) -> Matched | None:
     """What is found in flight that is not stalled; None if there is too little."""
+    form = form or _Form()
     flying = unstalled(flight, frame, np.zeros((flight.parts, 2)))
     if len(flying) < FEWEST_STEPS:
         return None
-    found = matched(plane_model(flying, frame, force_sigma, beyond))
+    form, first = _with_front(flying, frame, force_sigma, form)
+    found = matched(form.model(flying, frame, force_sigma), first)
     places = found.model.indices("wind")
     winds = found.fit.theta[places].reshape(-1, 2)
     flying = unstalled(flight, frame, winds)
     if len(flying) >= FEWEST_STEPS and float(np.max(np.linalg.norm(winds, axis=1))) > 1.0:
         # What was stalled could only be told with the wind.
-        found = matched(plane_model(flying, frame, force_sigma, beyond))
-    found = _slipping(found, flying, frame, force_sigma, beyond)
+        found = matched(form.model(flying, frame, force_sigma))
+    found = _slipping(found, flying, frame, force_sigma, form)
     more = structures(
-        found.plain or found.fit, beyond, WINGS, answering=found.fit.turned is not None
+        found.plain or found.fit, form.beyond, WINGS, answering=found.fit.turned is not None
     )
-    if more and len(beyond) < MOST_BEYOND:
+    if more and len(form.beyond) < MOST_BEYOND:
         # All else is asked anew beside it: what looked like gusts may have been this.
-        return _found(flight, frame, force_sigma, (*beyond, more[0].key))
+        wider = replace(form, beyond=(*form.beyond, more[0].key))
+        return _found(flight, frame, force_sigma, wider)
     if _false(found):
         return _found(_deaf(flight), frame, force_sigma)
     return found
+
+
+def _with_front(
+    flying: Flight, frame: PlaneAirframe, sigma: Array, form: _Form
+) -> tuple[_Form, Fit]:
+    """The form with a wind that becomes another at once, where it does, and its likelier fit.
+
+    Before anything else is asked, as a change of a copter is: all else would be bent by it.
+    """
+    first = likelier(form.model(flying, frame, sigma))
+    lasted = float(flying.t[-1] - flying.t[0])
+    if flying.parts > 1 or CHANGE in form.beyond or lasted < 2.0 * EVERY_S:
+        return form, first
+    found = front_of(
+        first,
+        lambda moment: form.turning(moment).model(flying, frame, sigma),
+        form.turning(None).model(flying, frame, sigma),
+    )
+    return (form, first) if found is None else (form.turning(found[0]), found[1])
 
 
 def _false(found: Matched) -> bool:
@@ -118,7 +167,7 @@ def _deaf(flight: Flight) -> Flight:
 
 
 def _slipping(
-    found: Matched, flying: Flight, frame: PlaneAirframe, sigma: Array, beyond: tuple[str, ...]
+    found: Matched, flying: Flight, frame: PlaneAirframe, sigma: Array, form: _Form
 ) -> Matched:
     """The same, but with the file's side force where the flight slips too little to tell it.
 
@@ -129,7 +178,7 @@ def _slipping(
     """
     if SideForce.name not in found.chosen.effects:
         return found
-    fit = likelier(plane_model(flying, frame, sigma, beyond, held=True))
+    fit = likelier(form.model(flying, frame, sigma, held=True))
     k = fit.model.axes.index(SIDE)
     slope = np.linalg.norm(fit.model.gust_slope(fit.theta)[:, k], axis=-1)
     errors = math.hypot(RECEIVER_M_S, flying.velocity_sigma)

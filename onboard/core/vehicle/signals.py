@@ -40,6 +40,16 @@ def rotor_functions(frame_class: float | None) -> tuple[int, ...]:
     return tuple(f for f in MOTOR_FUNCTIONS if f not in servos)
 
 
+def primary_airspeed(parameters: Mapping[str, float]) -> int:
+    """Number of the airspeed sensor that the autopilot is to fly by, from zero."""
+    return 1 if parameters.get("ARSPD_PRIMARY") == 1.0 else 0
+
+
+def airspeed_ratio(parameters: Mapping[str, float]) -> str:
+    """Name of the parameter that has the ratio of that sensor."""
+    return "ARSPD2_RATIO" if primary_airspeed(parameters) else "ARSPD_RATIO"
+
+
 @dataclass(frozen=True, slots=True)
 class Stream:
     """A signal at its own times: ``t`` (n,) s on the boot clock, ``x`` (n, k)."""

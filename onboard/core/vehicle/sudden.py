@@ -52,16 +52,16 @@ def change_of(fit: Fit, changing: Changing) -> Change | None:
         fit: of a model that knows no change, and of the likelihood's least.
         changing: makes the model that has one.
     """
-    moments = _moments(fit)
+    moments = moments_of(fit)
     if not len(moments) or fit.model.flight.commands.shape[1] == 0:
         return None
     gains = scores(fit, changing, moments)
-    if _by_chance(float(np.max(gains)), len(moments)):
+    if by_chance(float(np.max(gains)), len(CHANGES), len(moments)):
         return None
-    plain = scores(replace(fit, noise=_white(fit)), changing, moments)
+    plain = scores(replace(fit, noise=white(fit)), changing, moments)
     at = {int(moments[np.argmax(g)]) for g in (gains, plain)}
     its, change = min((_at(fit, changing, k) for k in at), key=lambda x: deviance(x[0]))
-    if _by_chance((deviance(fit) - deviance(its)) / its.scale, len(moments)):
+    if by_chance((deviance(fit) - deviance(its)) / its.scale, len(CHANGES), len(moments)):
         return None
     others = [_with(fit, changing(c)) for c in _gradual(fit, change)]
     ahead = min(deviance(other) - deviance(its) for other in others) / its.scale
@@ -86,9 +86,9 @@ def wind_instead(fit: Fit, change: Change, changing: Changing, blown: Blown) -> 
     return moment if best < without else None
 
 
-def _by_chance(gain: float, moments: int) -> bool:
-    """Whether so much is gained somewhere by chance."""
-    return survival(max(gain, 0.0), len(CHANGES)) * moments > FALSE_ALARM
+def by_chance(gain: float, unknowns: int, moments: int) -> bool:
+    """Whether so much is gained at one of the moments by chance, by so many unknowns."""
+    return survival(max(gain, 0.0), unknowns) * moments > FALSE_ALARM
 
 
 def _at(fit: Fit, changing: Changing, window: int) -> tuple[Fit, Change]:
@@ -99,7 +99,7 @@ def _at(fit: Fit, changing: Changing, window: int) -> tuple[Fit, Change]:
     return _with(fit, changing(change)), change
 
 
-def _white(fit: Fit) -> tuple[AxisNoise, ...]:
+def white(fit: Fit) -> tuple[AxisNoise, ...]:
     """Noise without a memory: least squares find the moment whatever the noise is.
 
     J. Bai, *Review of Economics and Statistics* 79 (1997).  What a change leaves to a fit that does
@@ -110,7 +110,18 @@ def _white(fit: Fit) -> tuple[AxisNoise, ...]:
 
 def scores(fit: Fit, changing: Changing, moments: NDArray[np.intp]) -> Array:
     """(c,) fall of chi-square by a change at each of these windows, to first order."""
-    slope, prior = _always(fit, changing)
+    return gained(fit, *_always(fit, changing), moments)
+
+
+def gained(fit: Fit, slope: Array, prior: Array, moments: NDArray[np.intp]) -> Array:
+    """(c,) fall of chi-square by what begins at each of these windows, to first order.
+
+    Args:
+        fit: of a model without it.
+        slope: (w, k, p) derivatives by what is there from the beginning, in windows.
+        prior: (p, p) information on it.
+        moments: (c,) windows.
+    """
     left = whitened_residual(fit.model, fit.residual, fit.noise, fit.sensitivity)
     by = whitened_regressors(fit.model, fit.jacobian, fit.noise, fit.sensitivity)
     p, d = slope.shape[-1], fit.jacobian.by.shape[-1]
@@ -188,7 +199,7 @@ def _always(fit: Fit, changing: Changing) -> tuple[Array, Array]:
     return windows_of(flight).mean(slope), np.diag(1.0 / models[0].plausible[places] ** 2)
 
 
-def _moments(fit: Fit) -> NDArray[np.intp]:
+def moments_of(fit: Fit) -> NDArray[np.intp]:
     """Windows that begin a block's length and more from either end of their recording."""
     flight = fit.model.flight
     first = windows_of(flight).first

@@ -17,7 +17,7 @@ from onboard.core.inputs.samples import ImuSample, VehicleState
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import GpsTruth, random_imus
 from sitl.recording import FlightSpec, fly_messages
-from tests.core.diagnosis.problems import Problem
+from tests.core.diagnosis.problems import BLOCK_S, Problem
 from tests.core.diagnosis.test_constancy import SHAPES, T, flight
 
 RATE = Candidate("clock_skew", (10,), (inf,))
@@ -51,6 +51,53 @@ def test_what_is_there_stays_beside_a_constant_that_changes(seed):
     made = flight(seed, late=2.0 * SHAPES["stepping"])
     rng = np.random.default_rng(seed + 100)
     assert gone(with_rate(made, rng.normal(size=made.y.shape), 0.5)) == []
+
+
+def stepping_within(seed: int, size: float, rate: float = 0.0) -> Problem:
+    """A latency that steps in the middle of a block, beside growth by time, in every row."""
+    made = flight(seed)
+    blocks, rows = made.y.shape
+    t = BLOCK_S * (np.arange(blocks * rows).reshape(blocks, rows) + 0.5) / rows
+    h, late = made.h.copy(), made.h[:, :, 6]
+    h[:, :, 10] = late * t / T[-1]
+    return replace(made, h=h, y=made.y + size * late * (t > T[9]) + rate * h[:, :, 10])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_step_within_a_piece_is_no_growth_either(seed):
+    """Within ten seconds it is as steep as no clock, and all of it had been put to the rate."""
+    made = stepping_within(seed, 10.0)
+    pieces = Pieces.of(made.blocks, made.model).freed(made.columns("late"))[0]
+    C = np.linalg.inv(pieces.N.sum(axis=0) + np.diag(pieces.prior))
+    assert pieces.theta[10] ** 2 / C[10, 10] > 25.0
+    assert gone(made) == [RATE]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_growth_that_is_there_stays_beside_a_step_within_a_piece(seed):
+    assert gone(stepping_within(seed, 10.0, 20.0)) == []
+
+
+def test_a_piece_with_a_size_of_its_own_is_one_with_a_column_of_its_own():
+    made = flight(3, place=0.8 * (np.arange(16) == 5))
+    own = list(made.columns("place"))
+    pieces = Pieces.of(made.blocks, made.model)
+    silenced = pieces.silenced(5, own)
+    h, y = made.rows
+    column = np.zeros((len(y), 3))
+    inside = np.repeat(np.arange(16), len(y) // 16) == 5
+    column[inside] = h[inside][:, own]
+    wide = np.hstack([h, column])
+    prior = np.concatenate([1.0 / made.model.prior_sigma, np.zeros(3)])
+    centre = np.concatenate([made.model.prior, np.zeros(3)])
+    A, b = np.vstack([wide, np.diag(prior)]), np.concatenate([y, prior * centre])
+    x = np.linalg.lstsq(A, b, rcond=None)[0]
+    np.testing.assert_allclose(silenced.theta, x[:-3], rtol=1e-6, atol=1e-9)
+    assert silenced.square == pytest.approx(float(np.sum((y - wide @ x) ** 2)), rel=1e-9)
+    plain = np.linalg.lstsq(A[:, :-3], b, rcond=None)[0]
+    fall = np.sum((b - A[:, :-3] @ plain) ** 2) - np.sum((b - A @ x) ** 2)
+    assert pieces.apart(own)[5] == pytest.approx(float(fall), rel=1e-6)
+    assert np.argmax(pieces.apart(own)) == 5
 
 
 def samples(seed: int, delay: float) -> list:

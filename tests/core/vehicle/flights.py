@@ -168,6 +168,7 @@ def plane_flight(
     turning=0.25,
     speeds=3.0,
     turned=0.0,
+    front=None,
 ):
     """A plane in turns and climbs; airspeed as a right sensor would read times ``reading``.
 
@@ -180,7 +181,7 @@ def plane_flight(
     plane slips as it does; ``angles`` is the standard deviation of the angle of attack.  Servos
     and motor follow behind a low-pass, s.  Standard deviations of the rate of turn and of the
     speed are ``turning``, rad/s, and ``speeds``, m/s; the recorded heading is ``turned`` too far
-    all flight long, rad.
+    all flight long, rad.  The wind becomes another at once, of a ``front`` (moment, by how much).
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -195,6 +196,8 @@ def plane_flight(
     x = speed / np.sqrt(1 + np.tan(alpha) ** 2 + np.tan(beta) ** 2)
     u = np.stack([x, x * np.tan(beta), x * np.tan(alpha)], axis=1)
     v_n = np.einsum("nij,nj->ni", R, u) + np.array([*wind, 0.0])
+    if front is not None:
+        v_n[t - t[0] >= front[0], :2] += np.asarray(front[1])
     if gusts:
         v_n = v_n + np.stack([smooth(rng, n, gusts, 1.0) for _ in range(3)], axis=1)
     height = 700.0 + smooth(rng, n, 10.0, 8.0)
