@@ -15,6 +15,7 @@ from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond, beyond_of, spoilt_by
 from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind_change import WindChange
 from onboard.core.vehicle.felt import felt_across, felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.gust_errors import rising, turned_by_gusts
@@ -105,7 +106,7 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
             done = free
     fit, model = done.fit, done.fit.model
     choices = Choices(fit)
-    chosen = choose(choices)
+    chosen = _blowing(model, choose(choices))
     nominal = model.measured() - model.predicted(model.nominal)
     of_all = replace(model, flight=whole)
     spans = not_used(of_all, fit, done.kept, done.turbulence.largest)
@@ -123,6 +124,19 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
         done.plain,
         above_bounds(fit),
         share_of(left, whole),
+    )
+
+
+def _blowing(model: ForceModel, chosen: Chosen) -> Chosen:
+    """With the wind named where it changes: its two halves may cancel in the mean that it has."""
+    changes = any(isinstance(e, WindChange) for e in model.effects)
+    if not changes or Wind.name in (*chosen.effects, *chosen.untestable):
+        return chosen
+    return replace(
+        chosen,
+        effects=(*chosen.effects, Wind.name),
+        gains=chosen.gains | {Wind.name: 0.0},
+        rivals=chosen.rivals | {Wind.name: ()},
     )
 
 
