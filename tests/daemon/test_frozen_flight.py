@@ -22,7 +22,8 @@ from sitl.recording import FlightSpec, fly_messages
 
 BOARD = Identity(1, board="0a0b0c")
 TWO = (ImuTruth(scale=(1.02, 0.985, 1.015)), ImuTruth(offset=(0.2, -0.15, 0.3)))
-SETTINGS = CalibratorSettings(refine=False, buffer_s=60.0)
+SETTINGS = CalibratorSettings(refine=False, buffer_s=65.0)
+"""A flight, and the last batch, which may be longer than ten seconds, of one before."""
 
 
 @pytest.fixture(scope="module")

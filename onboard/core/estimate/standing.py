@@ -9,6 +9,7 @@ else.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -80,7 +81,7 @@ class Standing:
 
     def hear_one(self, sample: ImuSample, parameters: ParametersInForce) -> None:
         """Take a sample that comes by itself: looked at with those of its stretch."""
-        if sample.w_b is None:
+        if sample.w_b is None or not math.isfinite(sum((sample.t, *sample.w_b, *sample.f_b))):
             return
         waiting = self._waiting.setdefault(sample.imu, [])
         if waiting and sample.t // STAND_S != waiting[0][0] // STAND_S:
@@ -110,11 +111,16 @@ class Standing:
     def of(self, calibration: Calibration, parameters: ParametersInForce) -> AtRest | None:
         """What an accelerometer reads there by its calibration; None if nobody saw it standing.
 
+        Asked at the end: the stretch that is not over is taken as it is.
+
         Args:
             calibration: of the accelerometer.
             parameters: in force, also where nobody knew them yet.
         """
         imu = calibration.imu
+        self.catch_up(imu, parameters)
+        if (stretch := self._open.pop(imu, None)) is not None:
+            self._over(imu, stretch, parameters)
         means = self._means.get(imu, [])
         covariance = np.array(calibration.covariance)
         if len(means) < FEWEST_STANDS or not np.all(np.isfinite(covariance)):
