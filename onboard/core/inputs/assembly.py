@@ -116,13 +116,7 @@ class Assembly:
             return {}
         self.streams.settle()
         live = self.streams.live
-        ready = min((track.last for track in live.values()), default=-np.inf) - AHEAD_S
-        if grounded is False and not everything:
-            ready = min(ready - TOUCHED_S, self._stood())
-        elif grounded is False and touched < np.inf:
-            ready = min(ready, touched, self._stood())
-        elif grounded is None and not everything:
-            ready = min(ready, self._rolling.held(*waiting.motion(ready)))
+        ready = self._ready(everything=everything, grounded=grounded, touched=touched)
         if min(ready, waiting.last) - waiting.first < least:
             return {}
         taken, trusted, t = waiting.take(ready)
@@ -151,6 +145,18 @@ class Assembly:
         self.standing_s += float(t[-1] - t[0]) - flown
         self.streams.drop_before(float(t[-1]) - REACH_S - KEPT_S)
         return out
+
+    def _ready(self, *, everything: bool, grounded: bool | None, touched: float) -> float:
+        """Until when fixes may be handed out: samples are there, and the ground is known, s."""
+        live = self.streams.live.values()
+        ready = min((track.last for track in live), default=-np.inf) - AHEAD_S
+        if grounded is False and not everything:
+            return min(ready - TOUCHED_S, self._stood())
+        if grounded is False and touched < np.inf:
+            return min(ready, touched, self._stood())
+        if grounded is None and not everything:
+            return min(ready, self._rolling.held(*self.streams.fixes.motion(ready)))
+        return ready
 
     def _stood(self) -> float:
         """Until when nothing is of the ground on which it stands now, s; inf if it does not.
