@@ -181,18 +181,8 @@ class Pieces:
         asked = np.einsum("pij,pj->pi", K, self.s[:, own])
         N, s = self.N - cross @ back, self.s - np.einsum("pij,pj->pi", cross, asked)
         N[:, own], N[:, :, own], s[:, own] = 0.0, 0.0, 0.0
-        total_N, total_s = N.sum(axis=0), s.sum(axis=0)
-        C = np.linalg.inv(total_N + np.diag(self.prior))
-        step = C @ (total_s + pull)
-        fall = float(np.sum(self.s[:, own] * asked)) + step @ (2.0 * total_s - total_N @ step)
-        made = replace(
-            self,
-            theta=self.theta + step,
-            N=N,
-            s=s - N @ step,
-            square=self.square - fall,
-            rows=self.rows - known,
-        )
+        gone = float(np.sum(self.s[:, own] * asked))
+        made, step, C = self._fitted(N, s, pull, gone, known)
         variance = K + back @ C @ back.transpose(0, 2, 1)
         values = self.theta[own] + asked - back @ step
         return made, values, np.sqrt(np.diagonal(variance, axis1=1, axis2=2))
@@ -214,15 +204,32 @@ class Pieces:
         K = np.linalg.inv(N[piece][np.ix_(own, own)])
         cross = N[piece][:, own].copy()
         asked = K @ s[piece, own]
-        known = float(len(own))
         N[piece] -= cross @ K @ cross.T
         s[piece] -= cross @ asked
         N[piece, own], N[piece][:, own], s[piece, own] = 0.0, 0.0, 0.0
         pull = -self.s.sum(axis=0)
+        return self._fitted(N, s, pull, float(self.s[piece, own] @ asked), float(len(own)))[0]
+
+    def _fitted(
+        self, N: Array, s: Array, pull: Array, gone: float, known: float
+    ) -> tuple[Self, Array, Array]:
+        """All unknowns anew, of pieces from which some have been taken.
+
+        Args:
+            N: (P, m, m) what the pieces know.
+            s: (P, m) what they ask for beyond the fit before.
+            pull: (m,) of the prior there.
+            gone: what those that were taken have explained.
+            known: rows that they have used up.
+
+        Returns:
+            The pieces; the step (m,); its covariance (m, m).
+        """
         total_N, total_s = N.sum(axis=0), s.sum(axis=0)
-        step = np.linalg.solve(total_N + np.diag(self.prior), total_s + pull)
-        fall = float(self.s[piece, own] @ asked) + step @ (2.0 * total_s - total_N @ step)
-        return replace(
+        C = np.linalg.inv(total_N + np.diag(self.prior))
+        step: Array = C @ (total_s + pull)
+        fall = gone + float(step @ (2.0 * total_s - total_N @ step))
+        made = replace(
             self,
             theta=self.theta + step,
             N=N,
@@ -230,6 +237,7 @@ class Pieces:
             square=self.square - fall,
             rows=self.rows - known,
         )
+        return made, step, C
 
     def held(self, index: int) -> Self:
         """The same with an unknown that stays as it is."""
