@@ -94,6 +94,14 @@ def test_what_no_flight_has_confirmed_is_said_to_whoever_is_to_approve_it():
     assert "approve" in said.next
 
 
+def test_where_only_another_flight_decides_it_is_what_is_to_be_done():
+    """After a boot, of values that somebody has changed: nothing compares old and new."""
+    held = {"unconfirmed": "somebody has changed it: fly", "no_improvement": "no residual"}
+    shut = ProposalView(imu=1, changes=(), held_back=held, approved=False, rejected=False)
+    said = state_of(calibration(held_out_before=math.nan), Circumstances(proposal=shut))
+    assert (said.name, said.next.split(":")[0]) == ("held_back", "fly again")
+
+
 def test_approved_with_nothing_to_change_is_not_about_to_be_written():
     said = state("nothing_to_change", approved=True)
     assert (said.name, said.next) == ("up_to_date", "")

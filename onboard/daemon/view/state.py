@@ -42,6 +42,7 @@ STEADY: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Instead of sentences that count seconds: a state is the same until something happens."""
 FLY_ON = "fly on with GPS trusted, changing speed and direction often"
+FLY_AGAIN = "fly again: the next flight decides on these values"
 GOOD, INFO, WARNING, ERROR = "good", "info", "warning", "error"
 _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 
@@ -153,6 +154,8 @@ def _proposed(
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
     more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
     todo = further or ("approve it if that is all right" if proposal.approvable else "")
+    if not todo and "unconfirmed" in lasting:  # and no person may: they could not be compared
+        todo = FLY_AGAIN
     title = f"{approved}but {title}" if approved else title
     return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
 
