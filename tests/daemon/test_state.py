@@ -94,6 +94,16 @@ def test_what_no_flight_has_confirmed_is_said_to_whoever_is_to_approve_it():
     assert "approve" in said.next
 
 
+@pytest.mark.parametrize("status", [Status.COLLECTING, Status.INSUFFICIENT])
+def test_of_a_flight_that_was_doubted_it_is_not_said_that_it_was_too_short(status):
+    """What was withdrawn for missing physics is not to be had by flying more of the same."""
+    doubted = calibration(status=status)
+    said = state_of(doubted, Circumstances(proposal=proposal("physics_missing", "unheard_of")))
+    assert (said.name, said.title) == (status.value, "held back by the diagnosis")
+    assert "the offset follows the temperature" in said.sentence
+    assert said.next == "see diagnosis"
+
+
 def test_where_only_another_flight_decides_it_is_what_is_to_be_done():
     """After a boot, of values that somebody has changed: nothing compares old and new."""
     held = {"unconfirmed": "somebody has changed it: fly", "no_improvement": "no residual"}

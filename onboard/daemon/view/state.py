@@ -73,6 +73,8 @@ def state_of(c: Calibration, now: Circumstances = ALONE) -> StateView:
     match c.status:
         case Status.INVALID:
             return _state("invalid", "cannot be used", c.note or "it has no valid answer", ERROR)
+        case Status.COLLECTING | Status.INSUFFICIENT if _missing(now):
+            return _doubted(c.status.value, f"not calibrated: {_missing(now)}")
         case Status.COLLECTING:
             return _state("collecting", "learning", _so_far(c), INFO, _to_fly(c))
         case Status.INSUFFICIENT:
@@ -111,8 +113,7 @@ def _calibrated(c: Calibration, now: Circumstances) -> StateView:
         return _state("rejected", "rejected", f"{known}; not written: {why}", INFO)
     lasting = {n: STEADY.get(n, s) for n, s in held.items() if not landing_lifts(n, held)}
     if "physics_missing" in lasting:
-        title, why = "held back by the diagnosis", lasting["physics_missing"]
-        return _state("held_back", title, f"{known}; not written: {why}", WARNING, "see diagnosis")
+        return _doubted("held_back", f"{known}; not written: {lasting['physics_missing']}")
     if "nothing_to_change" in lasting:
         whose = "the values that were written" if now.written else "these values already"
         return _state("up_to_date", "up to date", f"{known}; the autopilot has {whose}", GOOD)
@@ -158,6 +159,15 @@ def _proposed(
         todo = FLY_AGAIN
     title = f"{approved}but {title}" if approved else title
     return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
+
+
+def _missing(now: Circumstances) -> str:
+    """What the diagnosis of the last flight says against it: more of the same is no help then."""
+    return "" if now.proposal is None else now.proposal.held_back.get("physics_missing", "")
+
+
+def _doubted(name: str, sentence: str) -> StateView:
+    return _state(name, "held back by the diagnosis", sentence, WARNING, "see diagnosis")
 
 
 def _judged(c: Calibration) -> bool:
