@@ -103,7 +103,7 @@ motion than the accelerometer's own [cost]."""
 # Streams (tracks).
 
 HIGHRES_S: Final = 0.5
-"""s after a HIGHRES_IMU during which RAW_IMU, the coarser of the two, is not taken [cost]."""
+"""s after a HIGHRES_IMU during which nothing coarser of that accelerometer is taken [cost]."""
 
 # Even times of fixes (even_times).
 

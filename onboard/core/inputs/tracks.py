@@ -22,7 +22,7 @@ from onboard.core.inputs.limits import (
     STILL_M_S,
 )
 from onboard.core.inputs.rows import Rows
-from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.samples import COARSE, GpsFix, ImuSample, ImuSource
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array
 
@@ -87,7 +87,7 @@ class ImuTrack:
         t = sample.t
         if sample.source is ImuSource.HIGHRES_IMU:
             self.highres_t = t
-        elif sample.source is ImuSource.RAW_IMU and self.covers(t):
+        elif self.covers(t) and sample.source in COARSE:
             return False
         rows = self._rows
         if not t > rows.last:
@@ -106,13 +106,13 @@ class ImuTrack:
         return True
 
     def covers(self, t: float) -> bool:
-        """Whether HIGHRES_IMU came so shortly before ``t`` (s) that RAW_IMU is not taken."""
+        """Whether HIGHRES_IMU came so shortly before ``t`` (s) that no coarser one is taken."""
         return t - self.highres_t < HIGHRES_S
 
     def continued_by(self, columns: ImuColumns) -> bool:
         """Whether plain samples are newer than all that are here, and none is to be refused."""
         begins = columns.t.item(0)
-        coarse = columns.source is ImuSource.RAW_IMU and self.covers(begins)
+        coarse = columns.source in COARSE and self.covers(begins)
         return begins > self._rows.last and not coarse
 
     def extend(
