@@ -56,6 +56,8 @@ def state(*held, approved=False, **circumstances):
         (("armed",), "calibrated", "calibrated"),
         (("armed", "not_diagnosed"), "calibrated", "calibrated"),
         (("diagnosing",), "calibrated", "calibrated"),
+        (("diagnosing", "not_sure"), "calibrated", "calibrated"),
+        (("diagnosing", "unheard_of", "approval"), "calibrated", "calibrated"),
         (("approval",), "approval", "waits for your approval"),
         (("approval", "armed"), "calibrated", "calibrated"),
         (("approval", "not_diagnosed"), "held_back", "not diagnosed yet"),

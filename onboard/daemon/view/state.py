@@ -151,6 +151,9 @@ def _proposed(
         todo = "look at the values, then approve or reject them"
         why = f"{known}; {lasting.get('unconfirmed', 'a person has to approve it')}"
         return _state("approval", "waits for your approval", why, WARNING, todo)
+    if "diagnosing" in held:  # what else is against them is against values that are not the last
+        then = "what becomes of it is known when the flight has been diagnosed"
+        return _state("calibrated", done, f"{known}; {then}", GOOD, further)
     rest = [sentence for name, sentence in lasting.items() if name != "approval"]
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
     more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
