@@ -114,6 +114,19 @@ def test_where_only_another_flight_decides_it_is_what_is_to_be_done():
     assert (said.name, said.next.split(":")[0]) == ("held_back", "fly again")
 
 
+@pytest.mark.parametrize(
+    ("held", "what"),
+    [("temperature_reference_unknown", "bench"), ("not_sure", "fly again"), ("doubtful", "reset")],
+)
+def test_what_a_person_can_do_about_it_is_the_next_step(held, what):
+    """It is a warning, and beside it stood that there is nothing to do."""
+    shut = ProposalView(
+        imu=1, changes=(), held_back={held: "why", "approval": "a person"}, approved=False,
+        rejected=False,
+    )  # fmt: skip
+    assert what in state_of(calibration(), Circumstances(proposal=shut)).next
+
+
 def test_approved_with_nothing_to_change_is_not_about_to_be_written():
     said = state("nothing_to_change", approved=True)
     assert (said.name, said.next) == ("up_to_date", "")

@@ -43,6 +43,18 @@ STEADY: Final[Mapping[str, str]] = MappingProxyType(
 """Instead of sentences that count seconds: a state is the same until something happens."""
 FLY_ON = "fly on with GPS trusted, changing speed and direction often"
 FLY_AGAIN = "fly again: the next flight decides on these values"
+TO_DO: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "doubtful": "find out who else sends, then reset what was learned",
+        "temperature_learning": "let the autopilot finish its temperature calibration",
+        "temperature_reference_unknown": "calibrate the accelerometers on the bench once",
+        "out_of_bounds": "calibrate on the bench, and check how the autopilot is mounted",
+        "kept_value_contradicted": "run onboard explain on the recording",
+        "unconfirmed": FLY_AGAIN,
+        "not_sure": FLY_AGAIN,
+    }
+)
+"""Against what holds a value back that no approval lifts: the first of these."""
 GOOD, INFO, WARNING, ERROR = "good", "info", "warning", "error"
 _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 
@@ -157,9 +169,8 @@ def _proposed(
     rest = [sentence for name, sentence in lasting.items() if name != "approval"]
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
     more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
-    todo = further or ("approve it if that is all right" if proposal.approvable else "")
-    if not todo and "unconfirmed" in lasting:  # and no person may: they could not be compared
-        todo = FLY_AGAIN
+    cure = next((what for name, what in TO_DO.items() if name in lasting), "")
+    todo = further or ("approve it if that is all right" if proposal.approvable else cure)
     title = f"{approved}but {title}" if approved else title
     return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
 
