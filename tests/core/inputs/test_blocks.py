@@ -111,7 +111,8 @@ def highres(
         if isinstance(s, ImuSample) and s.imu == imu and s.t <= begin + seconds:
             count += 1
             if count % every == 0:
-                out.append(replace(s, source=ImuSource.HIGHRES_IMU, f_step=0.0, w_step=0.0))
+                fine = {"source": ImuSource.HIGHRES_IMU, "f_step": 0.0, "w_step": 0.0}
+                out.append(replace(s, temperature=None, **fine))
     return out
 
 
