@@ -323,7 +323,7 @@ class Learner:
             flown=flown,
             flight=None if self._unjudged else flight,
             diagnosing=self._examiner.waiting,
-            flying=self._in_air,
+            flying=self._in_air and parameters.armed is not False,
         )
 
     def _solve(self) -> None:
