@@ -94,6 +94,22 @@ def test_being_armed_on_the_ground_is_no_flight_to_be_judged(flight, tmp_path, s
     assert len(seen) == judged == 2
 
 
+@pytest.mark.slow
+def test_a_flight_is_over_when_that_was_heard_also_by_who_came_late(flight, tmp_path, seen):
+    """What has landed waits for its diagnosis, but not for one that never comes."""
+    one = learner(tmp_path / "one")
+    aloft, rest = until_disarmed(flight)
+    assert one.learn(aloft, judging=()).flying
+    ended = one.learn(rest, judging=())
+    assert (ended.flying, ended.diagnosing) == (False, (1, 2))
+    other = learner(tmp_path / "other")
+    other.learn(aloft, judging=())
+    other.reset()
+    assert other.learn([s for s in aloft[-9000:] if not isinstance(s, VehicleState)], judging=())
+    other._in_air = True  # a batch of flight was made in that last second
+    assert not other.learn(rest, judging=()).flying
+
+
 def calibrated(flight, imu):
     return replace(flight.calibration(imu), status=Status.CALIBRATED)
 

@@ -7,7 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.gps_clock import fix_clock
+from onboard.core.inputs.parameters import HELD, ParametersInForce
 from onboard.core.inputs.samples import ParameterValue
+from onboard.core.inputs.views import ASKED
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.learning.flight import Judged
 from onboard.daemon.learning.identity import Identity
@@ -16,11 +19,13 @@ from onboard.daemon.learning.meaning import (
     carried,
     corrections,
     hand_on,
+    matters,
     meanings,
     same_sensors,
 )
 from onboard.daemon.learning.meaning import in_force as in_force_of
 from onboard.daemon.learning.store import Store
+from onboard.daemon.pushing.parameters import NEEDED
 from onboard.push.diagnosed import Diagnosed
 from tests.daemon.daemons import calibration
 
@@ -39,6 +44,37 @@ def test_what_is_handed_on_means_the_same_to_the_next_estimator(told):
     assert meanings(second.parameters.values) == meanings(first.parameters.values)
     assert second.parameters.trim == first.parameters.trim
     assert (second.parameters.lever_arm(1) == first.parameters.lever_arm(1)).all()
+
+
+class Asked(dict):
+    """Parameters that note which of them anybody looks for."""
+
+    def __init__(self, values):
+        super().__init__(values)
+        self.names = set()
+
+    def __contains__(self, name):
+        self.names.add(name)
+        return super().__contains__(name)
+
+
+@pytest.mark.parametrize("told", [{}, {"AHRS_TRIM_X": 0.0}, {"AHRS_EKF_TYPE": 0.0}])
+@pytest.mark.parametrize("receiver", [1, 2])
+def test_whatever_an_estimator_looks_for_is_asked_for_and_handed_on(told, receiver):
+    """Else a live flight is learned as if it had the default, and its recording is not."""
+    asked = Asked(told)
+    parameters = ParametersInForce(asked, receiver=receiver)
+    for name in dir(ParametersInForce):
+        if isinstance(getattr(ParametersInForce, name), property):
+            getattr(parameters, name)
+    for imu in (1, 2, 3):
+        parameters.one_chip(imu)
+        parameters.lever_arm(imu)
+        asked.names |= {parameter_names(imu).gyro_id, *parameter_names(imu).six}
+    fix_clock(parameters, ())
+    asked.names |= {*HELD, *ASKED}
+    assert asked.names <= NEEDED
+    assert {name for name in asked.names if not matters(name)} == set()
 
 
 def learner(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from onboard.core.gps.trust import TrustWindow
 from onboard.daemon.learning.flight import Judged, JudgedFlight
 from onboard.daemon.learning.learner import Learned
+from onboard.daemon.pushing.people import approvable
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.view.trust import trust_view
 from onboard.errors import RefusedError
@@ -61,6 +62,24 @@ def test_in_flight_a_step_that_was_approved_too_large_waits_for_the_landing():
     assert proposals.ready() is None
     assert update(proposals, smaller)[1] == set()
     assert proposals.ready().wanted["INS_ACCSCAL_X"] == to_float32(1.0055)
+
+
+@pytest.mark.parametrize("approval", [True, False])
+def test_nobody_is_asked_to_approve_a_flight_that_is_diagnosed_in_a_moment(approval):
+    """The vehicle is seen to have landed before its last samples are learned."""
+    proposals = Proposals(PolicySettings(), approval=approval)
+    c = calibration()
+    ending = replace(learned(c), flight=None, flying=True)
+    told = {"system_id": 1, "parameters": current(1)}
+    proposals.update(0.0, learned=ending, condition=LANDED, **told)
+    held = proposals.current[1].held_back
+    assert held.keys() - {"approval"} == {"diagnosing"}
+    assert approvable(held) is approval
+    proposals.update(0.0, learned=ending, condition=FLYING, **told)
+    assert "not_diagnosed" in proposals.current[1].held_back
+    never = replace(ending, flying=False)
+    proposals.update(0.0, learned=never, condition=LANDED, **told)
+    assert "not_diagnosed" in proposals.current[1].held_back
 
 
 def test_values_that_are_never_written_are_not_approved():

@@ -56,6 +56,8 @@ def state(*held, approved=False, **circumstances):
         (("armed",), "calibrated", "calibrated"),
         (("armed", "not_diagnosed"), "calibrated", "calibrated"),
         (("diagnosing",), "calibrated", "calibrated"),
+        (("diagnosing", "not_sure"), "calibrated", "calibrated"),
+        (("diagnosing", "unheard_of", "approval"), "calibrated", "calibrated"),
         (("approval",), "approval", "waits for your approval"),
         (("approval", "armed"), "calibrated", "calibrated"),
         (("approval", "not_diagnosed"), "held_back", "not diagnosed yet"),
@@ -92,6 +94,37 @@ def test_what_no_flight_has_confirmed_is_said_to_whoever_is_to_approve_it():
     said = state("unconfirmed", "approval")
     assert said.sentence.endswith("learned before the autopilot last started")
     assert "approve" in said.next
+
+
+@pytest.mark.parametrize("status", [Status.COLLECTING, Status.INSUFFICIENT])
+def test_of_a_flight_that_was_doubted_it_is_not_said_that_it_was_too_short(status):
+    """What was withdrawn for missing physics is not to be had by flying more of the same."""
+    doubted = calibration(status=status)
+    said = state_of(doubted, Circumstances(proposal=proposal("physics_missing", "unheard_of")))
+    assert (said.name, said.title) == (status.value, "held back by the diagnosis")
+    assert "the offset follows the temperature" in said.sentence
+    assert said.next == "see diagnosis"
+
+
+def test_where_only_another_flight_decides_it_is_what_is_to_be_done():
+    """After a boot, of values that somebody has changed: nothing compares old and new."""
+    held = {"unconfirmed": "somebody has changed it: fly", "no_improvement": "no residual"}
+    shut = ProposalView(imu=1, changes=(), held_back=held, approved=False, rejected=False)
+    said = state_of(calibration(held_out_before=math.nan), Circumstances(proposal=shut))
+    assert (said.name, said.next.split(":")[0]) == ("held_back", "fly again")
+
+
+@pytest.mark.parametrize(
+    ("held", "what"),
+    [("temperature_reference_unknown", "bench"), ("not_sure", "fly again"), ("doubtful", "reset")],
+)
+def test_what_a_person_can_do_about_it_is_the_next_step(held, what):
+    """It is a warning, and beside it stood that there is nothing to do."""
+    shut = ProposalView(
+        imu=1, changes=(), held_back={held: "why", "approval": "a person"}, approved=False,
+        rejected=False,
+    )  # fmt: skip
+    assert what in state_of(calibration(), Circumstances(proposal=shut)).next
 
 
 def test_approved_with_nothing_to_change_is_not_about_to_be_written():

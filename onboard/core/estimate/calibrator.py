@@ -295,6 +295,7 @@ class Calibrator:
     def begin_flight(self, flight: str) -> None:
         """Learn another flight from nothing: whether it agrees with the one before is asked."""
         self._engines.begin_flight(flight)
+        self._trust.begin_flight()
 
     @property
     def waiting(self) -> tuple[int, ...]:

@@ -18,12 +18,16 @@ class ReceiverChoice:
         """Take the receiver to watch (None: the first) and the least fix type of another one."""
         self.receiver = receiver
         self._fix_type = fix_type
-        self._final = receiver is not None
+        self._named = self._final = receiver is not None
         self._other: tuple[int, float] | None = None  # another with a fix, and since when
 
     def settle(self) -> None:
         """The receiver had a trusted fix: it is watched for good."""
         self._final = True
+
+    def begin_anew(self) -> None:
+        """Nothing holds the latency of one any more: it may be given up, unless it was named."""
+        self._final, self._other = self._named, None
 
     def has_fix(self) -> None:
         """The receiver has a fix: others count from anew."""

@@ -160,6 +160,10 @@ class TrustWindow:
         self._first_opened = None
         return events
 
+    def begin_flight(self) -> None:
+        """What was learned by the receiver does not count any more: it may have failed since."""
+        self._watched.begin_anew()
+
     def finish(self) -> tuple[WindowEvent, ...]:
         """No more samples will come."""
         return self._end(

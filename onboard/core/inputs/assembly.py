@@ -31,7 +31,6 @@ from onboard.core.inputs.limits import (
     SAME_M_S2,
     SAME_RAD_S,
     SLOWEST_IMU_HZ,
-    TEMPERATURE_EVERY,
     TOUCHED_S,
 )
 from onboard.core.inputs.parameters import ParametersInForce
@@ -262,9 +261,9 @@ class Assembly:
             float(t[0]) - ATTITUDE_MARGIN_S, float(t[-1]) + ATTITUDE_MARGIN_S
         )
         slow = self.streams.slow_arrays(imu)
-        if np.all(np.isfinite(rows[:, 6])):
-            few = slice(None, None, TEMPERATURE_EVERY)
-            slow["temperature"] = (t[few].copy(), rows[few, 6].copy())
+        warmth = self.streams.imus[imu].warmth(t, rows[:, 6])
+        if warmth is not None:
+            slow["temperature"] = warmth
         return Segment(
             t,
             w_b,

@@ -22,6 +22,7 @@ from onboard.core.inputs.boot_time import LONGEST_DELAY_S
 from onboard.core.inputs.limits import HIGHRES_S
 from onboard.core.inputs.range_checks import attitudes_possible, imu_possible
 from onboard.core.inputs.samples import (
+    COARSE,
     AttitudeSample,
     GpsFix,
     ImuSample,
@@ -124,7 +125,7 @@ class Block:
     others: list[Sample]
     places: list[int]
     kept: tuple[ImuColumns, ...] = field(init=False, repr=False)
-    """Inertial samples without those of RAW_IMU where the finer HIGHRES_IMU is beside it."""
+    """Inertial samples without coarse ones where the finer HIGHRES_IMU is beside them."""
     coarse: tuple[tuple[ImuColumns, ImuColumns], ...] = field(init=False, repr=False)
     """Each of those, and the finer ones."""
     _imu_places: Places = field(init=False, repr=False)
@@ -136,7 +137,7 @@ class Block:
         t = np.concatenate([np.zeros(0), *(c.t for c in self.imus)])
         order = np.argsort(places)
         fine = {c.imu: c for c in self.imus if c.source is ImuSource.HIGHRES_IMU}
-        raw = [c for c in self.imus if c.source is ImuSource.RAW_IMU and c.imu in fine]
+        raw = [c for c in self.imus if c.source in COARSE and c.imu in fine]
         object.__setattr__(self, "kept", tuple(c for c in self.imus if c not in raw))
         object.__setattr__(self, "coarse", tuple((c, fine[c.imu]) for c in raw))
         object.__setattr__(self, "_imu_places", places[order])

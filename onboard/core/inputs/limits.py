@@ -81,7 +81,8 @@ LONGEST_ROLL_S: Final = 120.0
 """s; nobody rolls for longer between two stands, nor stands with turning rotors for longer before
 that is said: what does is flown close to the ground, or hovers [physics]."""
 SILENT_S: Final = 2.0
-"""s; an accelerometer that is so far behind the newest is not waited for [cost]."""
+"""s; an accelerometer that is so far behind the newest is not waited for, nor is a temperature that
+is told beside it carried on for longer [cost]."""
 LEAST_WAITING_S: Final = 0.5
 """s of flight without which there is nothing to cut at the end of a flight [cost]."""
 LEAST_LAG_S: Final = 2e-4
@@ -103,7 +104,7 @@ motion than the accelerometer's own [cost]."""
 # Streams (tracks).
 
 HIGHRES_S: Final = 0.5
-"""s after a HIGHRES_IMU during which RAW_IMU, the coarser of the two, is not taken [cost]."""
+"""s after a HIGHRES_IMU during which nothing coarser of that accelerometer is taken [cost]."""
 
 # Even times of fixes (even_times).
 

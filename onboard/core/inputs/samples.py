@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from onboard.core.inputs.limits import TOUCHED_S
 from onboard.core.maths.arrays import Vector3
@@ -22,6 +22,11 @@ class ImuSource(Enum):
     HIGHRES_IMU = "HIGHRES_IMU"
     SCALED_IMU = "SCALED_IMU"
     LOG = "log"
+
+
+COARSE: Final = (ImuSource.RAW_IMU, ImuSource.SCALED_IMU)
+"""In integers.  ArduPilot's HIGHRES_IMU is of the first accelerometer that is used and healthy,
+which may be any (INS_USE): beside it none of these is taken of that one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,18 +26,19 @@ from onboard.core.maths.arrays import Array
 class _Passing:
     """A block that is being gone through: how much of it has come, and is in the tracks."""
 
-    __slots__ = ("_block", "_taken", "parameters", "reached")
+    __slots__ = ("_block", "_taken", "beside", "parameters", "reached")
 
     def __init__(self, block: Block, parameters: ParametersInForce) -> None:
         self.parameters = parameters
         self.reached = 0
+        self.beside = tuple(raw for raw, _ in block.coarse)
         self._block = block
-        self._taken = [0] * (len(block.kept) + 1)
+        self._taken = [0] * (len(block.kept) + len(self.beside) + 1)
 
     def due(self) -> Iterator[tuple[ImuColumns | AttitudeColumns, slice]]:
         """Columns and rows of them that have come since the last time."""
         streams: tuple[ImuColumns | AttitudeColumns, ...]
-        streams = (*self._block.kept, self._block.attitude)
+        streams = (*self._block.kept, *self.beside, self._block.attitude)
         for k, columns in enumerate(streams):
             first, last = self._taken[k], int(np.searchsorted(columns.places, self.reached))
             if first < last:
@@ -115,6 +116,9 @@ class Streams:
             track = self.imus.get(columns.imu)
             if track is None:
                 track = self.imus[columns.imu] = ImuTrack()
+            if columns in self._passing.beside:
+                track.lay_beside(columns, rows)
+                continue
             self.over_mavlink = columns.source is not ImuSource.LOG
             R_bs = self._turned(parameters)
             track.extend(columns, rows, parameters.six(columns.imu), R_bs)

@@ -19,10 +19,13 @@ from onboard.core.inputs.limits import (
     GROUND_M,
     HIGHRES_S,
     LONGEST_FIX_GAP_S,
+    SILENT_S,
     STILL_M_S,
+    TEMPERATURE_EVERY,
 )
 from onboard.core.inputs.rows import Rows
-from onboard.core.inputs.samples import GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.samples import COARSE, GpsFix, ImuSample, ImuSource
+from onboard.core.inputs.segments import Signal
 from onboard.core.maths.accelerometer import SixParameters
 from onboard.core.maths.arrays import Array
 
@@ -54,11 +57,17 @@ class _Manner(NamedTuple):
 
 
 class ImuTrack:
-    """Raw inertial samples of one IMU."""
+    """Raw inertial samples of one IMU.
 
-    __slots__ = ("_arrays", "_manners", "_rows", "highres_t", "mismatched", "refused")
+    Attributes:
+        beside: temperature, degC, that coarser samples have told which were not taken: HIGHRES_IMU
+            tells none of the accelerometer.
+    """
+
+    __slots__ = ("_arrays", "_manners", "_rows", "beside", "highres_t", "mismatched", "refused")
 
     def __init__(self) -> None:
+        self.beside = SlowTrack()
         self._rows = Rows()
         """Rate, force and temperature as reported."""
         self._manners: list[tuple[int, _Manner]] = []
@@ -87,7 +96,9 @@ class ImuTrack:
         t = sample.t
         if sample.source is ImuSource.HIGHRES_IMU:
             self.highres_t = t
-        elif sample.source is ImuSource.RAW_IMU and self.covers(t):
+        elif self.covers(t) and sample.source in COARSE:
+            if sample.temperature is not None:
+                self.beside.add(t, (sample.temperature,))
             return False
         rows = self._rows
         if not t > rows.last:
@@ -106,13 +117,13 @@ class ImuTrack:
         return True
 
     def covers(self, t: float) -> bool:
-        """Whether HIGHRES_IMU came so shortly before ``t`` (s) that RAW_IMU is not taken."""
+        """Whether HIGHRES_IMU came so shortly before ``t`` (s) that no coarser one is taken."""
         return t - self.highres_t < HIGHRES_S
 
     def continued_by(self, columns: ImuColumns) -> bool:
         """Whether plain samples are newer than all that are here, and none is to be refused."""
         begins = columns.t.item(0)
-        coarse = columns.source is ImuSource.RAW_IMU and self.covers(begins)
+        coarse = columns.source in COARSE and self.covers(begins)
         return begins > self._rows.last and not coarse
 
     def extend(
@@ -124,6 +135,30 @@ class ImuTrack:
             self.highres_t = t.item(-1)
         self._made(columns.w_step, columns.f_step, six, R_bs)
         self._rows.extend(t, columns.rows[rows])
+
+    def lay_beside(self, columns: ImuColumns, rows: slice) -> None:
+        """Take the temperature of coarser samples that are not taken, as :meth:`add` would."""
+        t, celsius = columns.t[rows], columns.rows[rows, 6]
+        new = np.isfinite(celsius) & (t > self.beside.last)
+        if np.any(new):
+            self.beside.extend(t[new], celsius[new, None])
+
+    def warmth(self, t: Array, celsius: Array) -> Signal | None:
+        """Times (k,), s, and temperature (k,) during samples at ``t`` (n,); None: nobody told it.
+
+        Args:
+            t: s.
+            celsius: (n,) what the samples themselves told, NaN where nothing.
+        """
+        few, known = slice(None, None, TEMPERATURE_EVERY), np.isfinite(celsius)
+        if np.all(known):
+            return t[few].copy(), celsius[few].copy()
+        told, warm = self.beside.around(float(t[0]), float(t[-1]))
+        times = np.concatenate([t[known], told])
+        order = np.argsort(times, kind="stable")
+        if not len(told) or max(times.min() - t[0], t[-1] - times.max()) > SILENT_S:
+            return None
+        return times[order][few], np.concatenate([celsius[known], warm[:, 0]])[order][few]
 
     def _made(self, w_step: float, f_step: float, six: SixParameters, R_bs: Array | None) -> None:
         """Something is added that was made in this manner."""
@@ -155,6 +190,7 @@ class ImuTrack:
         """Forget what is older than ``t``."""
         i = int(np.searchsorted(self._rows.arrays()[0], t))
         self._rows.drop(i)
+        self.beside.drop_before(t)
         manners = [(max(first - i, 0), manner) for first, manner in self._manners]
         # Of those that begin with the first row that is left, the last is in force there.
         over = sum(first == 0 for first, _ in manners) - 1

@@ -78,7 +78,8 @@ def followed(segment: Segment, before: Mapping[str, Signal]) -> dict[str, Signal
 
     Args:
         segment: samples.
-        before: the same of the segment before; empty if it was at rest before this one.
+        before: the same of the segment before; empty if it was at rest before this one.  Of
+            another filter's it takes nothing.
 
     Returns:
         By :data:`TILTED` (k, 3 m), NED, rad per unit of each error, and by :data:`STATES`; empty of
@@ -123,7 +124,12 @@ def _begin(
         R_bs: (3, 3) board orientation.
         before: slow signals of the segment before.
     """
-    times, states = before.get(STATES, (np.zeros(0), np.zeros((0, 0))))
+    rested = by.at_rest(R_bs)
+    times, states = before.get(STATES, (np.zeros(0), np.zeros((0, len(rested)))))
+    if states.shape[1] != len(rested):
+        # AHRS_EKF_TYPE was changed in flight: those are the other filter's, and of this one, which
+        # went on beside it, nothing is known.
+        times, states = times[:0], states[:0]
     k = int(np.searchsorted(times, t[0]))
     if k < len(times):
         old, attitude = before[TILTED]
@@ -133,7 +139,7 @@ def _begin(
     if len(times):
         return float(t[0]), states[-1], nothing
     nose = rotation_from_euler(0.0, 0.0, np.arctan2(R[1, 0], R[0, 0]))
-    return float(t[0]), by.headed(by.at_rest(R_bs), nose), nothing
+    return float(t[0]), by.headed(rested, nose), nothing
 
 
 def _ends(t: Array) -> list[int]:

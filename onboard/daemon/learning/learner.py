@@ -70,7 +70,7 @@ class Learned:
     ``calibrations`` are of the last flight as it was judged, or of what was flown since then;
     ``flown`` is the answer of the flight that has just ended, if a push waits for it; ``flight``
     the one that was judged, None if none was or a new one is not judged yet; ``diagnosing`` the
-    accelerometers of one that is being judged.
+    accelerometers of one that is being judged; ``flying``: the end of one is not learned yet.
     """
 
     calibrations: dict[int, Calibration]
@@ -80,6 +80,7 @@ class Learned:
     flown: dict[int, Calibration] = field(default_factory=dict)
     flight: JudgedFlight | None = None
     diagnosing: tuple[int, ...] = ()
+    flying: bool = False
 
 
 class Learner:
@@ -232,17 +233,15 @@ class Learner:
         if self._flight is not None:  # forgotten where other sensors say who they are
             self._flight = self._flight.of_these_sensors(self._calibrator.parameters, of_none=True)
         learned = self._learned()
-        if in_flight and self._in_air:
-            ready = (c.status is Status.CALIBRATED for c in self._answers.values())
-            if any(ready):
-                self._examiner.flying(self._calibrator)
+        ready = (c.status is Status.CALIBRATED for c in self._answers.values())
+        if in_flight and self._in_air and any(ready):
+            self._examiner.flying(self._calibrator)
         return learned
 
     def examine(self) -> Learned:
         """Diagnose one accelerometer of those that wait for it; takes seconds."""
         trim()  # what the refinement of the flight has left
-        examined = self._examiner.examine_next()
-        if examined is not None:
+        if (examined := self._examiner.examine_next()) is not None:
             self._keep(examined)
             self._judged(examined.flight)
             # Another boot may have begun since the landing, or an engine: they know nothing of it.
@@ -324,6 +323,7 @@ class Learner:
             flown=flown,
             flight=None if self._unjudged else flight,
             diagnosing=self._examiner.waiting,
+            flying=self._in_air and parameters.armed is not False,
         )
 
     def _solve(self) -> None:

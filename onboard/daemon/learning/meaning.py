@@ -14,10 +14,11 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Six
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.samples import ParameterValue
+from onboard.core.inputs.views import ASKED
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.mavlink.parameter_messages import to_float32
 
-CARRIED = ("INS", "AHRS", "GPS", "ARMING")
+CARRIED = ("INS", "AHRS", "GPS", "ARMING", "EK3_IMU_MASK", "EK3_PRIMARY", *sorted(ASKED))
 """Beginnings of the names that change what an estimator makes of the messages."""
 IMUS = range(1, 6)
 CORRECTED = 1.0

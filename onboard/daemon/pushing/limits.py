@@ -11,7 +11,7 @@ from typing import Final
 # Reading the autopilot's parameters
 
 REREAD_S: Final = 30.0
-"""s; a change whose broadcast was lost is found this late at most [cost: 54 reads each time]."""
+"""s; a change whose broadcast was lost is found this late at most [cost: 77 reads each time]."""
 RETRY_S: Final = 10.0
 """s before a parameter that every autopilot has is read again, if it was not answered [tuned]."""
 ABSENT_S: Final = 300.0

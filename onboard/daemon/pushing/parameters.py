@@ -40,6 +40,7 @@ FIRST = REQUIRED[:7]
 MEANING = (
     "AHRS_ORIENTATION",
     "AHRS_EKF_TYPE",
+    "AHRS_EKF_USE",
     "AHRS_RP_P",
     "AHRS_TRIM_X",
     "AHRS_TRIM_Y",
@@ -50,14 +51,11 @@ MEANING = (
 )
 """Change what the messages mean or what may be written; not every firmware has all."""
 KNOWLEDGE = (
-    *(
-        name
-        for receiver in (1, 2)
-        for what, names in receiver_names(receiver).items()
-        if what != "TYPE"
-        for name in names
-    ),
+    *(name for receiver in (1, 2) for names in receiver_names(receiver).values() for name in names),
     *(f"INS_POS{imu}_{axis}" for imu in IMUS for axis in "XYZ"),
+    *(parameter_names(imu).gyro_id for imu in IMUS),
+    "EK3_IMU_MASK",
+    "EK3_PRIMARY",
     *sorted(views.ASKED),
 )
 """Good to have, in a recording too; under one of two names, by version; the last ones of planes."""

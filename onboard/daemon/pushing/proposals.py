@@ -137,7 +137,9 @@ class Proposals:
         held = {}
         for imu, plan in plans.items():
             held[imu] = self._beyond_policy(imu, now)
-            held[imu] |= self._physics(imu, diagnosing=bool(learned.diagnosing))
+            # Its end is a batch away from a vehicle that has landed, or more on a slow companion.
+            ended = learned.flying and condition.armed is False
+            held[imu] |= self._physics(imu, diagnosing=bool(learned.diagnosing) or ended)
             found = judge(plan, calibrations[imu], condition, self.settings, values=parameters)
             for refusal in found:  # several of one name (six sigmas): the first says enough
                 held[imu].setdefault(refusal.objection.value, refusal.sentence)

@@ -42,6 +42,19 @@ STEADY: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Instead of sentences that count seconds: a state is the same until something happens."""
 FLY_ON = "fly on with GPS trusted, changing speed and direction often"
+FLY_AGAIN = "fly again: the next flight decides on these values"
+TO_DO: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "doubtful": "find out who else sends, then reset what was learned",
+        "temperature_learning": "let the autopilot finish its temperature calibration",
+        "temperature_reference_unknown": "calibrate the accelerometers on the bench once",
+        "out_of_bounds": "calibrate on the bench, and check how the autopilot is mounted",
+        "kept_value_contradicted": "run onboard explain on the recording",
+        "unconfirmed": FLY_AGAIN,
+        "not_sure": FLY_AGAIN,
+    }
+)
+"""Against what holds a value back that no approval lifts: the first of these."""
 GOOD, INFO, WARNING, ERROR = "good", "info", "warning", "error"
 _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 
@@ -72,6 +85,8 @@ def state_of(c: Calibration, now: Circumstances = ALONE) -> StateView:
     match c.status:
         case Status.INVALID:
             return _state("invalid", "cannot be used", c.note or "it has no valid answer", ERROR)
+        case Status.COLLECTING | Status.INSUFFICIENT if _missing(now):
+            return _doubted(c.status.value, f"not calibrated: {_missing(now)}")
         case Status.COLLECTING:
             return _state("collecting", "learning", _so_far(c), INFO, _to_fly(c))
         case Status.INSUFFICIENT:
@@ -110,8 +125,7 @@ def _calibrated(c: Calibration, now: Circumstances) -> StateView:
         return _state("rejected", "rejected", f"{known}; not written: {why}", INFO)
     lasting = {n: STEADY.get(n, s) for n, s in held.items() if not landing_lifts(n, held)}
     if "physics_missing" in lasting:
-        title, why = "held back by the diagnosis", lasting["physics_missing"]
-        return _state("held_back", title, f"{known}; not written: {why}", WARNING, "see diagnosis")
+        return _doubted("held_back", f"{known}; not written: {lasting['physics_missing']}")
     if "nothing_to_change" in lasting:
         whose = "the values that were written" if now.written else "these values already"
         return _state("up_to_date", "up to date", f"{known}; the autopilot has {whose}", GOOD)
@@ -149,12 +163,25 @@ def _proposed(
         todo = "look at the values, then approve or reject them"
         why = f"{known}; {lasting.get('unconfirmed', 'a person has to approve it')}"
         return _state("approval", "waits for your approval", why, WARNING, todo)
+    if "diagnosing" in held:  # what else is against them is against values that are not the last
+        then = "what becomes of it is known when the flight has been diagnosed"
+        return _state("calibrated", done, f"{known}; {then}", GOOD, further)
     rest = [sentence for name, sentence in lasting.items() if name != "approval"]
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
     more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
-    todo = further or ("approve it if that is all right" if proposal.approvable else "")
+    cure = next((what for name, what in TO_DO.items() if name in lasting), "")
+    todo = further or ("approve it if that is all right" if proposal.approvable else cure)
     title = f"{approved}but {title}" if approved else title
     return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
+
+
+def _missing(now: Circumstances) -> str:
+    """What the diagnosis of the last flight says against it: more of the same is no help then."""
+    return "" if now.proposal is None else now.proposal.held_back.get("physics_missing", "")
+
+
+def _doubted(name: str, sentence: str) -> StateView:
+    return _state(name, "held back by the diagnosis", sentence, WARNING, "see diagnosis")
 
 
 def _judged(c: Calibration) -> bool:

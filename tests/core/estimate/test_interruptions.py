@@ -199,7 +199,9 @@ def test_the_result_does_not_depend_on_looking_at_it(flight, plain):
     assert np.array_equal(six(watched)[0], six(plain)[0])
 
 
-def test_high_resolution_is_preferred_where_it_comes(flight, plain):
+@pytest.mark.parametrize("source", [ImuSource.RAW_IMU, ImuSource.SCALED_IMU])
+def test_high_resolution_is_preferred_where_it_comes(flight, plain, source):
+    """Also beside SCALED_IMU2: it is of the first that is used, and INS_USE may be 0."""
     coarse = []
     for sample in flight:
         if isinstance(sample, ImuSample):
@@ -207,7 +209,7 @@ def test_high_resolution_is_preferred_where_it_comes(flight, plain):
             wrong = tuple(x + 1.0 for x in sample.f_b)
             coarse += [
                 fine,
-                replace(sample, t=sample.t + 4e-3, f_b=wrong, source=ImuSource.RAW_IMU),
+                replace(sample, t=sample.t + 4e-3, f_b=wrong, source=source),
             ]
         else:
             coarse.append(sample)

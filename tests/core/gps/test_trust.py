@@ -335,12 +335,19 @@ def test_a_receiver_that_has_never_had_a_fix_is_given_up_for_one_that_has(after)
     assert opened(window, events) == pytest.approx(GIVEN_UP_S, abs=1.0)
 
 
-def test_a_receiver_that_was_trusted_is_not_exchanged():
-    window = TrustWindow()
+@pytest.mark.parametrize("named", [None, 1])
+def test_a_receiver_that_was_trusted_is_not_exchanged_before_the_next_flight(named):
+    window = TrustWindow(receiver=named)
     both(window, 0.0, 5.0, first={}, second={})
     both(window, 5.2, 5.0 + 2 * GIVEN_UP_S, first={"fix_type": 0}, second={})
     assert window.receiver == 1
     assert not window.is_open
+    window.restart(5.0 + 2 * GIVEN_UP_S)
+    both(window, 1.0, 2 * GIVEN_UP_S, first=None, second={})
+    assert window.receiver == 1, "sums may go on over a boot"
+    window.begin_flight()
+    both(window, 2 * GIVEN_UP_S + 1.0, 4 * GIVEN_UP_S, first=None, second={})
+    assert (window.receiver, window.is_open) == ((2, True) if named is None else (1, False))
 
 
 def test_a_slow_start_is_waited_for():

@@ -102,16 +102,17 @@ def without(samples: list[Sample], at: int, kinds: type, seconds: float) -> list
 
 
 def highres(
-    samples: list[Sample], at: int, *, every: int = 1, seconds: float = 6.0
+    samples: list[Sample], at: int, *, every: int = 1, seconds: float = 6.0, imu: int = 1
 ) -> list[Sample]:
     """The finer stream beside the coarser one, at the same times, for a while."""
     out, begin, count = samples[:at], time_at(samples, at), 0
     for s in samples[at:]:
         out.append(s)
-        if isinstance(s, ImuSample) and s.imu == 1 and s.t <= begin + seconds:
+        if isinstance(s, ImuSample) and s.imu == imu and s.t <= begin + seconds:
             count += 1
             if count % every == 0:
-                out.append(replace(s, source=ImuSource.HIGHRES_IMU, f_step=0.0, w_step=0.0))
+                fine = {"source": ImuSource.HIGHRES_IMU, "f_step": 0.0, "w_step": 0.0}
+                out.append(replace(s, temperature=None, **fine))
     return out
 
 
@@ -172,6 +173,7 @@ CHANGES = {
     "EKF": lambda s, k: inserted(s, k, EkfHealth(time_at(s, k), 1 << 15 | 1)),
     "spoofed": lambda s, k: inserted(s, k, GpsIntegrity(time_at(s, k), False, True)),
     "highres": highres,
+    "highres of the second": lambda s, k: highres(s, k, imu=2),
     "slow highres": lambda s, k: highres(s, k, every=40),
     "some highres": lambda s, k: highres(s, k, every=20, seconds=0.5),
 }

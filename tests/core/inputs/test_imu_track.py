@@ -1,5 +1,7 @@
 """What was measured is found again from samples, whatever made them, and whatever changed when."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,27 @@ def test_arrays_of_before_stay_as_they_were():
     np.testing.assert_array_equal(rows, before)
     with pytest.raises(ValueError, match="read-only"):
         rows[0, 0] = 0.0
+
+
+def test_temperature_is_that_of_the_coarser_samples_where_the_finer_ones_tell_none():
+    """ArduPilot's HIGHRES_IMU has the barometer's, RAW_IMU and SCALED_IMU2 the accelerometer's."""
+    track, same = ImuTrack(), SixParameters()
+    for k in range(1000):
+        t, celsius = 0.02 * k, 30.0 + 0.001 * k
+        coarse = sample(t, (0.0, 0.0, -9.8), same, None, STEP)
+        coarse = replace(coarse, temperature=celsius if k < 800 else None)
+        fine = replace(coarse, t=t + 1e-4, temperature=None, source=ImuSource.HIGHRES_IMU)
+        assert track.add(coarse, same, None) is (k == 0 or k < 100)
+        if k >= 99:
+            assert track.add(fine, same, None)
+    t, rows = track.arrays()
+    for first, last in ((0.0, 1.9), (0.5, 10.0), (5.0, 15.0), (10.0, 17.9)):
+        part = (t >= first) & (t <= last)
+        times, warm = track.warmth(t[part], rows[part, 6])
+        np.testing.assert_allclose(warm, 30.0 + 0.05 * times, atol=1e-6)
+        assert times[0] < first + 0.1
+        assert times[-1] > last - 2.2, "of ten samples one"
+    silent = t > 12.0
+    assert track.warmth(t[silent], rows[silent, 6]) is None, "for too long nobody has told it"
+    track.drop_before(10.0)
+    assert track.beside.first > 9.0

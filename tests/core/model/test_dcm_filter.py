@@ -166,3 +166,21 @@ def test_it_is_followed_where_dcm_reports_the_attitude(right):
         autopilot_attitude.followed(s, {})[autopilot_attitude.TILTED][1] for s in (of_dcm, of_ekf)
     )
     assert np.abs(dcm - ekf).max() > 0.01
+
+
+@pytest.mark.parametrize("order", [(None, 0.2, None), (0.2, None, 0.2)])
+def test_one_filter_goes_on_from_no_state_of_another(right, order):
+    """AHRS_EKF_TYPE is changed in flight: what follows begins as one of which nothing is known."""
+    whole = segment_of(right)
+    angles = np.zeros((len(whole.t_attitude), 3))
+    before = {}
+    for start, gain in zip((0.0, 20.0, 40.0), order, strict=True):
+        part = slice(*np.searchsorted(whole.t, [start, start + 25.0]))
+        samples = {name: getattr(whole, name)[part] for name in ("t", "w_b", "raw_s")}
+        attitude = ReportedAttitude(angles, (0.0, 0.0, 0.0), dcm_gain=gain)
+        segment = replace(whole, R_attitude=attitude, **samples)
+        told = autopilot_attitude.followed(segment, before)
+        alone = autopilot_attitude.followed(segment, {})
+        for name in (autopilot_attitude.TILTED, autopilot_attitude.STATES):
+            np.testing.assert_array_equal(told[name][1], alone[name][1])
+        before = told
