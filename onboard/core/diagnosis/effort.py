@@ -22,6 +22,8 @@ FURTHEST: Final = 3
 """Times that a search goes on beyond its edge."""
 ONCE_MORE: Final = 12
 """Moments about the best one of a search that are looked at once more, with the jump in place."""
+MOST_AT_ONCE: Final = 24
+"""Moments with a column each in one pass: its time grows with their square."""
 SHORTEST_S: Final = 4.0
 """s of flight between two clipped parts that are worth keeping."""
 FORGOTTEN_S: Final = 45.0
