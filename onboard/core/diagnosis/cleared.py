@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from onboard.core.diagnosis.clipping import saturation_effect
+from onboard.core.diagnosis.clipping import at_the_rail, saturation_effect
 from onboard.core.diagnosis.coarse_readings import coarse_of
+from onboard.core.diagnosis.effort import WORTH_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
 from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
@@ -27,6 +28,8 @@ from onboard.core.model.regressors import Family
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.finding import Finding
+
+CUT = "the accelerometer clipped nearly all the time, which changes the force as well"
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,15 +81,16 @@ def cleared(
     rail = saturation_effect(flight, origin.t0)
     batches = flight
     if rail is not None:
-        batches = unclipped(batches, rail.intervals, origin.t0)
-        if sum(c.trusted_s for c in batches) < calibrator.settings.minimum_s:
-            # Clipped all the time: what is left would say less than what is spoiled.
-            batches = flight
+        batches = _unclipped(flight, rail, origin.t0)
+    clipped = rail is not None and batches is flight
     testable, absent = testable_of(catalogue(origin), batches)
     if rail is not None:
-        absent += [NotTestable(f.effect, why) for f in testable if (why := f.bent_by_clipping)]
-        testable = [f for f in testable if not f.bent_by_clipping]
-    clipped = rail is not None and batches is flight
+        bent = {
+            f.effect: f.bent_by_clipping or (CUT if clipped and f.changes_force else "")
+            for f in testable
+        }
+        absent += [NotTestable(name, why) for name, why in bent.items() if why]
+        testable = [f for f in testable if not bent[f.effect]]
     coarse = coarse_of(batches, calibrator.parameters.six(origin.imu))
     carried: tuple[Family, ...] = () if coarse is None else (coarse.conversion,)
     asked = _Asked(engine, testable, origin.t0, carried, beside)
@@ -115,6 +119,18 @@ def cleared(
     full.let_epochs_go()
     told = None if coarse is None else coarse.finding
     return Cleared(full, testable, absent, rail, fault, spikes, told, clipped, sampled)
+
+
+def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch]:
+    """The flight without what was clipped at all, else without what was for long, or as it is.
+
+    What is left of it may say little, but no wrong number.
+    """
+    for spans in (rail.intervals, at_the_rail(flight, t0)):
+        left = unclipped(flight, spans, t0) if spans else flight
+        if left is not flight and sum(batch.trusted_s for batch in left) >= WORTH_S:
+            return left
+    return flight
 
 
 def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from onboard.core.diagnosis.effort import TOGETHER_S
 from onboard.core.diagnosis.limits import FEWEST_CLIPPED, LEAST_RAIL
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.diagnosis.score import least
 from onboard.core.inputs.segments import Batch
+from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.saturation import Saturation
 from onboard.core.physics.finding import Finding, Quantity
 
@@ -18,34 +21,48 @@ from onboard.core.physics.finding import Finding, Quantity
 def saturation_effect(batches: Sequence[Batch], t0: float) -> Finding | None:
     """An accelerometer at the rail of its range: stuck samples, or a count of clipped ones.
 
+    Where it is at its rail at all, whatever was counted goes with it: what vibration takes over the
+    rail is cut off, and the mean of what is left, which a low-pass reports, is no force.
+
     Args:
         batches: the flight.
         t0: first sample, s.
     """
     if not batches:
         return None
-    return _stuck(batches, t0) or _counted(batches, t0)
+    counted = _counted(batches)
+    return _stuck(batches, t0, counted.spans) or _often(batches, t0, counted)
 
 
-def _counted(batches: Sequence[Batch], t0: float) -> Finding | None:
+def at_the_rail(batches: Sequence[Batch], t0: float) -> tuple[tuple[float, float], ...]:
+    """When samples stay at one extreme value, s since ``t0``: what was clipped for long."""
+    found = _stuck(batches, t0, np.zeros((0, 2)))
+    return () if found is None else found.intervals
+
+
+@dataclass(frozen=True, slots=True)
+class _Counted:
+    """Times between two reports of clipping in which it was counted, (k, 2) s, and how often."""
+
+    spans: Array
+    rise: Array
+
+
+def _counted(batches: Sequence[Batch]) -> _Counted:
+    told = [c.segment.slow["clipping"] for c in batches if "clipping" in c.segment.slow]
+    if not told:
+        return _Counted(np.zeros((0, 2)), np.zeros(0))
+    t, first = np.unique(np.concatenate([x[0] for x in told]), return_index=True)
+    rise = np.diff(np.concatenate([x[1] for x in told])[first])
+    hit = np.flatnonzero(rise > 0)
+    return _Counted(np.stack([t[hit], t[hit + 1]], axis=-1), rise[hit])
+
+
+def _often(batches: Sequence[Batch], t0: float, counted: _Counted) -> Finding | None:
     """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
-    names = [c.segment.slow["clipping"] for c in batches if "clipping" in c.segment.slow]
-    if not names:
+    if np.count_nonzero(counted.rise >= FEWEST_CLIPPED) < 2:
         return None
-    t = np.concatenate([x[0] for x in names])
-    counts = np.concatenate([x[1] for x in names])
-    t, first = np.unique(t, return_index=True)
-    rise = np.diff(counts[first])
-    hit = np.flatnonzero(rise >= FEWEST_CLIPPED)
-    if len(hit) < 2:
-        return None
-    spans_of = [(float(t[i]), float(t[i + 1])) for i in hit]
-    joined: list[tuple[float, float]] = []
-    for begin, end in spans_of:
-        if joined and begin - joined[-1][1] < 1e-3:
-            joined[-1] = (joined[-1][0], end)
-        else:
-            joined.append((begin, end))
+    joined = _joined(counted.spans, 1e-3)
     raw = np.concatenate([c.segment.raw_s for c in batches])
     times = np.concatenate([c.segment.t for c in batches])
     inside = np.zeros(len(times), dtype=bool)
@@ -59,11 +76,27 @@ def _counted(batches: Sequence[Batch], t0: float) -> Finding | None:
     return _saturation(batches, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
 
 
-def _stuck(batches: Sequence[Batch], t0: float) -> Finding | None:
+def _joined(spans: Array, apart: float) -> list[tuple[float, float]]:
+    """Spans (k, 2), s, in order; those that are no further ``apart``, s, are one."""
+    out: list[tuple[float, float]] = []
+    for begin, end in spans[np.argsort(spans[:, 0])].tolist():
+        if out and begin - out[-1][1] <= apart:
+            out[-1] = out[-1][0], max(end, out[-1][1])
+        else:
+            out.append((begin, end))
+    return out
+
+
+def _stuck(batches: Sequence[Batch], t0: float, counted: Array) -> Finding | None:
     """Accelerometer samples that stay at one extreme value: the rail of its range.
 
     Even a reading that is the one before every other time stays at its extreme so often with the
     probability of so many heads in a row.
+
+    Args:
+        batches: the flight.
+        t0: first sample, s.
+        counted: (k, 2) s; when else it was clipped.
     """
     best: tuple[int, float, NDArray[np.bool_], int] | None = None
     for j in range(3):
@@ -81,10 +114,7 @@ def _stuck(batches: Sequence[Batch], t0: float) -> Finding | None:
         return None
     t = np.concatenate([c.segment.t for c in batches])
     where = t[best[2]]
-    cuts = np.flatnonzero(np.diff(where) > 2.0)
-    starts = np.concatenate([[where[0]], where[cuts + 1]])
-    ends = np.concatenate([where[cuts], [where[-1]]])
-    found = [(float(a), float(b)) for a, b in zip(starts, ends, strict=True)]
+    found = _joined(np.concatenate([np.stack([where, where], axis=-1), counted]), TOGETHER_S)
     return _saturation(batches, t0, abs(best[1]), 0.01, best[3], found, best[0] / len(t))
 
 

@@ -22,8 +22,14 @@ FURTHEST: Final = 3
 """Times that a search goes on beyond its edge."""
 ONCE_MORE: Final = 12
 """Moments about the best one of a search that are looked at once more, with the jump in place."""
+MOST_AT_ONCE: Final = 24
+"""Moments with a column each in one pass: its time grows with their square."""
 SHORTEST_S: Final = 4.0
 """s of flight between two clipped parts that are worth keeping."""
+TOGETHER_S: Final = 2.0
+"""s; samples at a rail that are no further apart are of one time at it."""
+WORTH_S: Final = 10.0
+"""s of flight that are worth a look without the rest of it: the filter settles in as much."""
 FORGOTTEN_S: Final = 45.0
 """s of flight to either side of a jump that are gone through: a filter that GPS corrects has then
 forgotten nine tenths of what tells it (two simulated copters and planes: 0.95 to 1.00; 0.80 to 0.96

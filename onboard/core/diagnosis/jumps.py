@@ -6,7 +6,6 @@ attitude a kick that dead reckoning knows nothing of; with little flight after i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +14,7 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
-from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, ONCE_MORE, SPACINGS_S
+from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, MOST_AT_ONCE, ONCE_MORE, SPACINGS_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import (
     CLEARLY,
@@ -115,13 +114,33 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float, reach:
 
 
 def placed(full: Examination, seen: BiasStep) -> BiasStep:
-    """A jump that other accelerometers have seen, where they and GPS together like it best."""
-    fine, sigma = SPACINGS_S[-1], seen.onset_sigma
-    reach = fine * math.ceil(2.0 * sigma / fine)  # 95 % of what they say
-    t = np.arange(-reach, reach + 1e-6, fine) + seen.moment
-    t = t[t > full.blocks[0].start]
-    gain = _scaled(full, (), [seen.at(float(m)) for m in t]) - ((t - seen.moment) / sigma) ** 2
-    return seen.at(float(t[np.argmax(gain)]), sigma=time_sigma(t, gain, fine))
+    """A jump that other accelerometers have seen, where they and GPS together like it best.
+
+    They may know when it was to half a minute only, so that it is looked for coarsely first.
+    """
+    coarse, fine = SPACINGS_S
+    reach = 2.0 * seen.onset_sigma  # 95 % of what they say
+    t = _moments(full, seen.moment - reach, seen.moment + reach, coarse)
+    like = _liked(full, seen, t)
+    near = t[like > like.max() - CLEARLY]
+    t = _moments(full, near[0] - coarse, near[-1] + coarse, fine)
+    like = _liked(full, seen, t)
+    return seen.at(float(t[np.argmax(like)]), sigma=time_sigma(t, like, fine))
+
+
+def _moments(full: Examination, first: float, last: float, spacing: float) -> Array:
+    """Moments within the flight, s; one at least."""
+    start, end = full.blocks[0].start, full.blocks[-1].end
+    t = np.arange(first, last + 1e-6, spacing)
+    inside: Array = t[(t > start) & (t < end)]
+    return inside if len(inside) else np.clip([0.5 * (first + last)], start, end)
+
+
+def _liked(full: Examination, seen: BiasStep, t: Array) -> Array:
+    """Chi-square (n,) by which GPS and those that have seen a jump speak for it at each moment."""
+    apart = (t - seen.moment) / seen.onset_sigma
+    out: Array = _scaled(full, (), [seen.at(float(m)) for m in t]) - apart**2
+    return out
 
 
 def halved(seen: BiasStep) -> BiasStep:
@@ -194,9 +213,12 @@ def _best(
 
 def _scaled(full: Examination, chosen: Sequence[Effect], jumps: Sequence[BiasStep]) -> Array:
     """Gain of each jump alone, by the variance of gains over what the sums say."""
-    fitter, before, fits = fitted(full, chosen, jumps)
-    gain = [fitter.gain(before, after) for _, after in fits]
-    return np.array(gain) / max(fitter.pool.variance, 1.0)
+    out: list[float] = []
+    for some in (jumps[i : i + MOST_AT_ONCE] for i in range(0, len(jumps), MOST_AT_ONCE)):
+        fitter, before, fits = fitted(full, chosen, some)
+        variance = max(fitter.pool.variance, 1.0)
+        out += [fitter.gain(before, after) / variance for _, after in fits]
+    return np.array(out)
 
 
 def candidates_of(made: Examination, family: Effect) -> list[Candidate]:

@@ -108,7 +108,7 @@ def examine(
             tuple(families),
             rivals,
             companions,
-            believed(flight, calibrator.trust.refusals),
+            believed(clear.sampled, calibrator.trust.refusals),
             unused,
             clear.as_sampled,
         ),

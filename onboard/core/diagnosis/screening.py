@@ -22,6 +22,7 @@ from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.going_through import through
+from onboard.core.estimate.limits import DELAY_RANGE_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.traces import Traces, residual
@@ -47,7 +48,7 @@ def unclipped(
         t = batch.fixes.t - t0
         bad = np.zeros(len(t), dtype=bool)
         for a, b in intervals:
-            bad |= (t >= a - MARGIN_S) & (t <= b + MARGIN_S)
+            bad |= (t >= a - MARGIN_S) & (t <= b + MARGIN_S + DELAY_RANGE_S[1])
             # An interval between two fixes spoils what is integrated from one to the other.
             inside = np.flatnonzero((t[:-1] < b) & (t[1:] > a))
             bad[inside + 1] = True

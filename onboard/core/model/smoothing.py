@@ -34,7 +34,8 @@ def weight_of_two(window: float, apart: float) -> float:
     they are further apart.
     """
     spread = window / SPREAD / max(apart, 1e-9)
-    return 0.5 - math.sqrt(max(0.25 - spread**2, 0.0))
+    weight = 0.5 - math.sqrt(max(0.25 - spread**2, 0.0))
+    return weight if 1.0 - weight < 1.0 else 0.0  # what rounding loses is no moment
 
 
 def between_two(window: float, older: float) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.clipping import saturation_effect
+from onboard.core.diagnosis.clipping import at_the_rail, saturation_effect
 from onboard.core.diagnosis.limits import FEWEST_CLIPPED
 from onboard.core.inputs.samples import Vibration
 from onboard.core.inputs.streams import Streams
@@ -113,6 +113,19 @@ def test_counted_clipping_spans_the_reports_between_which_it_rose():
     assert abs(limit.value - 30.0) < 2.0 * limit.sigma
     assert found.share_of_mismatch == pytest.approx(3.0 / 60.0, rel=0.2)
     assert {w.axis for w in found.where} == {"body_y"}
+
+
+def test_where_samples_are_stuck_whatever_was_counted_goes_with_them():
+    """Vibration is cut off long before the mean is at the rail, and a low-pass reports the mean."""
+    raw = np.clip(
+        burst(flown(np.random.default_rng(8), 60.0), 2, -80.0, (20.2, 20.9)), -LIMIT, LIMIT
+    )
+    flight = batches(raw, slow=counted({21: 400, 22: 3, 41: 1}))
+    found = saturation_effect(flight, T0)
+    assert found.unknowns["limit"].value == pytest.approx(LIMIT)
+    assert found.intervals == (pytest.approx((20.0, 22.0)), pytest.approx((40.0, 41.0)))
+    assert at_the_rail(flight, T0) == (pytest.approx((20.2, 20.88)),)
+    assert at_the_rail(batches(flown(np.random.default_rng(9), 60.0)), T0) == ()
 
 
 @pytest.mark.parametrize("named", [True, False])

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.explaining import heard
 from onboard.core.diagnosis import jumps, onsets, stepped, testability
-from onboard.core.diagnosis.effort import FORGOTTEN_S
+from onboard.core.diagnosis.effort import FORGOTTEN_S, MOST_AT_ONCE
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import SCAN_S
 from onboard.core.diagnosis.procedure import diagnose
@@ -149,6 +149,25 @@ def test_it_is_found_to_the_second(full, off, reach):
     found = jumps.jump_near(full, (), AT + off, reach(full))
     assert found.moment == pytest.approx(AT, abs=1.0)
     assert jumps.shock_instead(full, found) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("off", "sigma"), [(1.5, 1.0), (20.0, 25.0)])
+def test_a_moment_that_others_hardly_know_is_placed_by_gps_with_few_columns_at_once(
+    full, monkeypatch, off, sigma
+):
+    counts, fitted = [], jumps.fitted
+
+    def counted(full, chosen, steps):
+        counts.append(len(steps))
+        return fitted(full, chosen, steps)
+
+    monkeypatch.setattr(jumps, "fitted", counted)
+    seen = BiasStep(Origin(0.0)).at(full.point.skew_from + AT + off, sigma=sigma)
+    found = jumps.placed(full, seen)
+    assert found.moment - full.point.skew_from == pytest.approx(AT, abs=1.5)
+    assert found.onset_sigma < 1.5
+    assert max(counts) <= MOST_AT_ONCE
 
 
 def scan(gain):

@@ -8,6 +8,7 @@ import pytest
 from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.limits import MARGIN_S
 from onboard.core.diagnosis.screening import unclipped
+from onboard.core.estimate.limits import DELAY_RANGE_S
 from tests.core.diagnosis.flights import batches, resting
 
 T0 = 100.0
@@ -22,7 +23,8 @@ def spoiled(batch, intervals):
     t, bad = batch.fixes.t - T0, set()
     for a, b in intervals:
         for i, x in enumerate(t):
-            if a - MARGIN_S <= x <= b + MARGIN_S:
+            # A fix is of up to so long before its stamp.
+            if a - MARGIN_S <= x <= b + MARGIN_S + DELAY_RANGE_S[1]:
                 bad.add(i)
             if i and t[i - 1] < b and x > a:
                 bad.add(i)

@@ -114,6 +114,20 @@ def test_clipping_that_the_low_pass_hides_is_found_by_its_count():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("vehicle", "seed"), [("copter", 62), ("plane", 65)])
+def test_what_vibration_takes_over_the_rail_bends_no_number(vehicle, seed):
+    """Most of the flight clips, and of most of that a low-pass leaves no sample at the rail."""
+    imus = random_imus(seed)
+    limit = concealed.Saturation(limit=12.5 if vehicle == "copter" else 13.2)
+    said, _ = diagnosed(vehicle, seed, limit, duration=150.0, imus=imus)
+    assert said.verdict is Verdict.EXPLAINED
+    assert [e.name for e in said.effects if e.name != "gps_latency"] == ["saturation"]
+    c, true = said.calibration, imus[0]
+    off = np.subtract(c.scale + c.offset, true.scale + true.offset)
+    assert np.abs(off / (c.scale_sigma + c.offset_sigma)).max() < 3.5
+
+
+@pytest.mark.slow
 def test_what_has_no_name_gets_none_but_its_formula():
     hidden = concealed.Nameless(term="dynamic_pressure", x=-0.2, y=-0.2, z=-0.2)
     said, _ = diagnosed("copter", 45, hidden, duration=150.0)

@@ -106,3 +106,10 @@ def test_in_gusts_a_span_comes_to_rest_with_its_shares_taken_in(newer, seed):
     )
     assert with_shares[5:].max() < 1e-3
     assert without[5:].max() > 4e-3
+
+
+@pytest.mark.parametrize("window", np.geomspace(1e-11, 1e-5, 25))
+def test_a_span_that_rounding_hides_is_none(window):
+    gained = Gained(0.0, 0.01, np.ones((200, 3)))
+    made = Response(gained, np.array([0.8, 1.0]), window, np.full(4, 0.2), REACH)
+    assert np.abs(made.shaped).max() < 1e-9
