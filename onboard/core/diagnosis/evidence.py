@@ -52,6 +52,8 @@ from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.effects.mount_tilt import trim_in_words
 from onboard.core.physics.finding import Finding
 
+CUT = "the accelerometer clipped nearly all the time, so that nothing is known of its numbers"
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
@@ -59,7 +61,8 @@ class Evidence:
 
     ``companions`` are all accelerometers of the vehicle; ``believed`` is the number of fixes of the
     flight that were to be used, ``unused`` flight without any; ``sampled`` is the flight as it was
-    sampled, but for what is false.
+    sampled, but for what is false; ``clipped`` if the accelerometer was at its rail so much of it
+    that nothing was left out.
     """
 
     full: Examination
@@ -71,6 +74,7 @@ class Evidence:
     believed: int = 0
     unused: tuple[Unused, ...] = ()
     sampled: tuple[Batch, ...] = ()
+    clipped: bool = False
 
 
 class Judge:
@@ -91,9 +95,8 @@ class Judge:
         self.absent, self.excluded = list(absent), list(excluded)
         self.undecided = undecided(evidence.choice, evidence.families)
         self.left_open = left_open(self.undecided)
-        self.calibration: Calibration = calibrator.calibration_with(
-            imu, evidence.final, self.left_open
-        )
+        made = calibrator.calibration_with(imu, evidence.final, self.left_open)
+        self.calibration: Calibration = made.untold(CUT) if evidence.clipped else made
         self.final = FinalModel(evidence.final, evidence.families, origin, calibrator.parameters)
         self.findings = Findings(self.final, evidence.choice, evidence.full.point)
 

@@ -111,6 +111,7 @@ def examine(
             believed(clear.sampled, calibrator.trust.refusals),
             unused,
             clear.as_sampled,
+            clear.clipped,
         ),
         origin,
         clear.absent,

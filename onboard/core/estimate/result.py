@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any, Self
 
@@ -158,6 +158,26 @@ class Calibration:
         """(6,) sigmas of :attr:`with_its_gyroscope`."""
         out: Array = np.sqrt(np.diag(self.with_its_gyroscope))
         return out
+
+    def untold(self, why: str) -> Self:
+        """The record of a flight that says nothing of the six: what was known before it.
+
+        Args:
+            why: in words, noted first.
+        """
+        status = Status.INSUFFICIENT if self.status is Status.CALIBRATED else self.status
+        scale_sigma, offset_sigma = self.prior_sigma[:3], self.prior_sigma[3:]
+        return replace(
+            self,
+            status=status,
+            scale=self.in_force_scale,
+            offset=self.in_force_offset,
+            scale_sigma=scale_sigma,
+            offset_sigma=offset_sigma,
+            covariance=tuple(map(tuple, np.diag(np.square(self.prior_sigma)).tolist())),
+            observable=(False,) * 6,
+            note=f"{why}. {self.note}".rstrip(),
+        )
 
     @classmethod
     def unanswered(

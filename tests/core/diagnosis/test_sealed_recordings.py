@@ -128,6 +128,18 @@ def test_what_vibration_takes_over_the_rail_bends_no_number(vehicle, seed):
 
 
 @pytest.mark.slow
+def test_of_an_accelerometer_that_clips_all_the_time_nothing_is_known():
+    said, _ = diagnosed("plane", 67, concealed.Saturation(limit=10.9), duration=110.0)
+    assert "saturation" in {e.name for e in said.effects}
+    c = said.calibration
+    assert (c.scale, c.offset) == (c.in_force_scale, c.in_force_offset)
+    assert (*c.scale_sigma, *c.offset_sigma) == c.prior_sigma
+    assert c.note.count("clipped nearly all the time") == 1
+    untestable = {n.name for n in said.not_testable}
+    assert {"accelerometer_hysteresis", "cross_axis", "bias_ramp"} <= untestable
+
+
+@pytest.mark.slow
 def test_what_has_no_name_gets_none_but_its_formula():
     hidden = concealed.Nameless(term="dynamic_pressure", x=-0.2, y=-0.2, z=-0.2)
     said, _ = diagnosed("copter", 45, hidden, duration=150.0)
