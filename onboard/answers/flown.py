@@ -22,7 +22,7 @@ from onboard.answers.stands import fixes_of, said_to_stand, with_landings, witho
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.mean_force import mean_force_sigma
+from onboard.core.estimate.mean_force import load_sigma, mean_force_sigma
 from onboard.core.estimate.misread import attitude_error, misread_of
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S
@@ -39,6 +39,7 @@ from onboard.core.inputs.samples import (
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.repeats import measured
@@ -313,9 +314,10 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
     if diagnosis.silent or engine is None:
         scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
         sigma = np.full(3, UNKNOWN_FORCE)
+        by_load: Array | None = None
     else:
         scale, offset = np.array(c.scale), np.array(c.offset)
-        sigma = _force_sigma(engine)
+        sigma, by_load = _force_sigma(engine), load_sigma(engine)
         misread, turned = misread_of(engine), attitude_error(engine)
     tilt, tilt_sigma = turned or (np.zeros(3), UNKNOWN_TILT)
     return Sensors(
@@ -329,6 +331,7 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
         misread,
         tilt,
         tilt_sigma,
+        np.full(3, UNKNOWN_FORCE / STANDARD_GRAVITY) if by_load is None else by_load,
     )
 
 

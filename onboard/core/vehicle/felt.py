@@ -238,7 +238,7 @@ def _summed(
         fit,
         theta=theta,
         blocks=tuple(sums),
-        inflation=inflation_of(sums, fit.prior, theta <= model.least),
+        inflation=inflation_of(sums, fit.prior, theta <= model.least, fit.considered),
         noise=noise,
         residual=residual,
         jacobian=jacobian,

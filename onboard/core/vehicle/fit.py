@@ -29,6 +29,7 @@ from onboard.core.vehicle.limits import (
     STALE,
 )
 from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.motion_errors import scores_of
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise
 from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
@@ -50,6 +51,7 @@ class Fit:
         sensitivity: (n, k) to gusts, 1/s.
         block: (n,) number of the block of each step.
         doubt: (m,) by how much laws may be wrong in the unknowns.
+        considered: (m, l) what each error of the recorded motion adds to the scores.
         turned: what gusts may have done to the unknowns; None where none are seen.
     """
 
@@ -64,6 +66,7 @@ class Fit:
     sensitivity: Array
     block: NDArray[np.int64]
     doubt: Array
+    considered: Array
     turned: Turned | None = None
 
     @property
@@ -176,6 +179,7 @@ def summed(
     block = np.repeat(of_row, windows.counts)
     left = whitened_residual(model, residual, noise, sensitivity)
     by = whitened_regressors(model, jacobian, noise, sensitivity, level)
+    considered = scores_of(model, theta, by, noise, sensitivity)
     part = model.flight.part[windows.first]
     sums = []
     for number in np.unique(of_row):
@@ -189,13 +193,14 @@ def summed(
         theta,
         prior,
         tuple(sums),
-        inflation_of(sums, prior, theta <= model.least),
+        inflation_of(sums, prior, theta <= model.least, considered),
         tuple(noise),
         residual,
         jacobian,
         sensitivity,
         block,
         np.zeros(len(theta)),
+        considered,
     )
 
 
@@ -256,34 +261,54 @@ def _level(model: ForceModel, theta: Array) -> Columns | None:
     return model.levelled.steps(theta) if model.instrumented else None
 
 
-def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask) -> Array:
-    """(m,) variance of the estimate by the scatter of the scores, over that of the sums.
+def inflation_of(
+    blocks: Sequence[BlockSums], prior: Array, held: Mask, considered: Array
+) -> Array:
+    """(m,) variance of the estimate by what is known of its errors, over that of the sums.
 
-    The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).
-    Each unknown has its own, but none less than the mean of all: a few blocks know single ones
-    badly.  Errors of one flight go together (its sensors, its load, how well its wind was
-    measured), and flights that contradict each other do not show it from block to block: where
-    there are enough of them, their scores' scatter counts, too, if it is the larger.  The scores of
-    what is ``held`` (m,) at its bound have a mean, which is no scatter.
+    By blocks it is the jackknife's, each left out in turn (R. M. Bell and D. F. McCaffrey, *Survey
+    Methodology* 28, 2002): about an estimate that few blocks have made their scores scatter less
+    than those of flight that it has not seen, and where a number rests on one turn it is that turn
+    which has to be left out to see it.  No unknown has less than the mean of all: a few blocks know
+    single ones badly.
+
+    Errors of one flight go together (its sensors, its load, how well its wind was measured), and
+    flights that contradict each other do not show it from block to block: where there are enough of
+    them, their scatter counts, too, if it is the larger.  And so do errors of known size of the
+    motion, which a short flight does not show by any scatter.
+
+    Args:
+        blocks: sums about the estimate.
+        prior: (m,) weights.
+        held: (m,) whether an unknown is at its bound: its scores have a mean, which is no scatter.
+        considered: (m, l) of :attr:`Fit.considered`.
     """
-    m = len(prior)
-    inverse = np.linalg.inv(total(blocks, m)[0] + np.diag(prior))
-    known = np.diag(inverse @ (np.linalg.inv(inverse) - np.diag(prior)) @ inverse)
+    N = total(blocks, len(prior))[0]
+    inverse = np.linalg.inv(N + np.diag(prior))
+    known = np.maximum(np.diag(inverse @ N @ inverse), 1e-300)
     told = np.diag(inverse) * prior < 0.5
-    scores = np.zeros((len(blocks), m))
-    for score, block in zip(scores, blocks, strict=True):
-        score[block.places] = block.b
-    numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
-    of_flights = np.zeros((len(numbers), m))
-    np.add.at(of_flights, which, scores)
-    out = np.ones(m)
-    for by_block, every in ((True, scores), (False, of_flights)):
-        count = len(every)
-        clusters = every - np.where(held, np.mean(every, axis=0), 0.0)
-        if count < FEWEST_BLOCKS:
+    moved = inverse @ considered
+    out = 1.0 + np.sum(moved**2, axis=1) / known
+    by_flight: dict[int, list[BlockSums]] = {}
+    for block in blocks:
+        by_flight.setdefault(block.part, []).append(block)
+    for by_block, clusters in ((True, [[b] for b in blocks]), (False, list(by_flight.values()))):
+        if len(clusters) < FEWEST_BLOCKS:
             continue
-        robust = inverse @ (clusters.T @ clusters) @ inverse * count / (count - 1.0)
-        ratio = np.diag(robust) / np.maximum(known, 1e-300)
+        ratio = _jackknifed(clusters, N + np.diag(prior), held) / known
         mean = float(np.mean(ratio[told])) if told.any() and by_block else 1.0
         out = np.maximum(out, np.maximum(ratio, mean))
+    return out
+
+
+def _jackknifed(clusters: Sequence[Sequence[BlockSums]], information: Array, held: Mask) -> Array:
+    """(m,) variances by leaving each of some clusters of blocks out in turn."""
+    m, count = len(information), len(clusters)
+    sums = [total(cluster, m) for cluster in clusters]
+    scores = np.stack([b for _, b, _ in sums])
+    scores = scores - np.where(held, np.mean(scores, axis=0), 0.0)
+    moves = [
+        np.linalg.solve(information - N, score) for (N, _, _), score in zip(sums, scores, strict=True)
+    ]
+    out: Array = np.sum(np.square(moves), axis=0) * (count - 1.0) / count
     return out

@@ -153,4 +153,4 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     step = Choices(wide).solved([e.name for e in effects]).x
     there = [replace(b, b=b.b - b.times(step)) for b in wide.blocks]
     held = theta + step <= model.least
-    return replace(wide, inflation=inflation_of(there, wide.prior, held))
+    return replace(wide, inflation=inflation_of(there, wide.prior, held, wide.considered))

@@ -26,6 +26,7 @@ from onboard.core.vehicle.limits import (
 )
 from onboard.core.vehicle.smoother import (
     BIAS,
+    HEADING,
     PSI,
     Levels,
     Steps,
@@ -56,6 +57,8 @@ class Sensors:
         tilt: (3,) roll and pitch of the body by which the recorded attitude is turned too far, and
             heading to north, rad.
         tilt_sigma: (3,) of that, rad.
+        load_sigma: (3,) what they leave unknown of how the force changes with the load, by the
+            load, body axes.
     """
 
     scale: Array
@@ -68,6 +71,7 @@ class Sensors:
     misread: Misread | None = None
     tilt: Array = field(default_factory=lambda: np.zeros(3))
     tilt_sigma: Array = field(default_factory=UNKNOWN_TILT.copy)
+    load_sigma: Array = field(default_factory=lambda: np.zeros(3))
 
     def attitude(self, R_nb: Array) -> Array:
         """Recorded attitudes (n, 3, 3) without what they are off by all flight long."""
@@ -106,6 +110,9 @@ class Motion:
         height: (n,) above mean sea level, m.
         velocity_sigma: of the velocity, m/s.
         attitude_sigma: (3,) of the attitude, about north, east and down, rad.
+        load_sigma: as that of the sensors.
+        heading_drift: (n,) standard deviation of what the heading is off by more and more, with
+            its sign from where it is known best, rad.
         fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
             force and recorded attitude, m/s, but for a constant.
     """
@@ -118,6 +125,8 @@ class Motion:
     height: Array
     velocity_sigma: float
     attitude_sigma: Array
+    load_sigma: Array
+    heading_drift: Array
     fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
 
     def finer(self, step_s: float) -> Motion:
@@ -139,6 +148,7 @@ class Motion:
             R_nb=_at(t, self.t, self.R_nb.reshape(-1, 9)).reshape(-1, 3, 3),
             v_n=_at(t, self.t, self.v_n),
             height=np.interp(t, self.t, self.height),
+            heading_drift=np.interp(t, self.t, self.heading_drift),
         )
 
 
@@ -203,6 +213,8 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         np.interp(t, true_t, fix_h),
         float(np.max(errors.sigma[V])),
         attitude_known(steps, levels, start),
+        sensors.load_sigma,
+        np.interp(t, true_t, _drift(true_t, errors.variance[:, HEADING])),
         (true_t, fix_v - average),
     )
 
@@ -225,6 +237,19 @@ def _steps(at: Array, t: Array, f_n: Array, w_b: Array, R: Array, measured: Arra
         R[nearest],
         measured,
     )
+
+
+def _drift(t: Array, variance: Array) -> Array:
+    """(n,) rad by which a heading is off more and more, in one standard deviation of that.
+
+    Between turns a bias of the gyroscope turns it, at an even rate: from where it is known best the
+    variance (n,), rad^2, grows.
+    """
+    since = t - t[np.argmin(variance)]
+    size = float(np.sqrt(np.mean(since**2)))
+    more = float(np.mean(variance) - np.min(variance))
+    out: Array = np.sqrt(max(more, 0.0)) * since / max(size, 1e-9)
+    return out
 
 
 def _levels(steps: Steps, start: Array) -> Levels:
