@@ -296,7 +296,7 @@ def inflation_of(
         if len(clusters) < FEWEST_BLOCKS:
             continue
         ratio = _jackknifed(clusters, N + np.diag(prior), held) / known
-        mean = float(np.mean(ratio[told])) if told.any() and by_block else 1.0
+        mean = float(np.median(ratio[told])) if told.any() and by_block else 1.0
         out = np.maximum(out, np.maximum(ratio, mean))
     return out
 
