@@ -20,6 +20,7 @@ from onboard.core.vehicle.columns import Columns
 from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
     FEWEST_BLOCKS,
+    FEWEST_FLIGHTS,
     LEAST_SHARE,
     MORE_ROUNDS,
     NOISE_ROUNDS,
@@ -261,9 +262,7 @@ def _level(model: ForceModel, theta: Array) -> Columns | None:
     return model.levelled.steps(theta) if model.instrumented else None
 
 
-def inflation_of(
-    blocks: Sequence[BlockSums], prior: Array, held: Mask, considered: Array
-) -> Array:
+def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask, considered: Array) -> Array:
     """(m,) variance of the estimate by what is known of its errors, over that of the sums.
 
     By blocks it is the jackknife's, each left out in turn (R. M. Bell and D. F. McCaffrey, *Survey
@@ -274,7 +273,8 @@ def inflation_of(
 
     Errors of one flight go together (its sensors, its load, how well its wind was measured), and
     flights that contradict each other do not show it from block to block: where there are enough of
-    them, their scatter counts, too, if it is the larger.  And so do errors of known size of the
+    them, their scores' scatter counts, too, if it is the larger (what is a flight's own no other
+    one tells, so none is left out).  And so do errors of known size of the
     motion, which a short flight does not show by any scatter.
 
     Args:
@@ -288,27 +288,42 @@ def inflation_of(
     known = np.maximum(np.diag(inverse @ N @ inverse), 1e-300)
     told = np.diag(inverse) * prior < 0.5
     moved = inverse @ considered
-    out = 1.0 + np.sum(moved**2, axis=1) / known
-    by_flight: dict[int, list[BlockSums]] = {}
-    for block in blocks:
-        by_flight.setdefault(block.part, []).append(block)
-    for by_block, clusters in ((True, [[b] for b in blocks]), (False, list(by_flight.values()))):
-        if len(clusters) < FEWEST_BLOCKS:
-            continue
-        ratio = _jackknifed(clusters, N + np.diag(prior), held) / known
-        mean = float(np.median(ratio[told])) if told.any() and by_block else 1.0
+    out: Array = 1.0 + np.sum(moved**2, axis=1) / known
+    scores = np.zeros((len(blocks), len(prior)))
+    for score, block in zip(scores, blocks, strict=True):
+        score[block.places] = block.b
+    if len(blocks) >= FEWEST_BLOCKS:
+        ratio = _jackknifed(blocks, _about(scores, held), inverse) / known
+        mean = float(np.mean(ratio[told])) if told.any() else 1.0
         out = np.maximum(out, np.maximum(ratio, mean))
+    numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
+    count = len(numbers)
+    if count >= FEWEST_FLIGHTS:
+        of_flights = np.zeros((count, len(prior)))
+        np.add.at(of_flights, which, scores)
+        moved = inverse @ _about(of_flights, held).T
+        out = np.maximum(out, np.sum(moved**2, axis=1) * count / (count - 1.0) / known)
     return out
 
 
-def _jackknifed(clusters: Sequence[Sequence[BlockSums]], information: Array, held: Mask) -> Array:
-    """(m,) variances by leaving each of some clusters of blocks out in turn."""
-    m, count = len(information), len(clusters)
-    sums = [total(cluster, m) for cluster in clusters]
-    scores = np.stack([b for _, b, _ in sums])
-    scores = scores - np.where(held, np.mean(scores, axis=0), 0.0)
-    moves = [
-        np.linalg.solve(information - N, score) for (N, _, _), score in zip(sums, scores, strict=True)
-    ]
-    out: Array = np.sum(np.square(moves), axis=0) * (count - 1.0) / count
+def _about(scores: Array, held: Mask) -> Array:
+    """Scores (c, m) less their mean where they have one."""
+    out: Array = scores - np.where(held, np.mean(scores, axis=0), 0.0)
     return out
+
+
+def _jackknifed(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:
+    """(m,) variances by leaving each of the blocks out in turn.
+
+    Args:
+        blocks: c of them.
+        scores: (c, m) theirs.
+        inverse: (m, m) of the information of all.
+    """
+    out = np.zeros(len(inverse))
+    for score, block in zip(scores, blocks, strict=True):
+        # Without it A - E N E^T is left, and (A - E N E^T)^-1 E = A^-1 E (1 - N E^T A^-1 E)^-1.
+        its = block.places
+        left = np.eye(len(its)) - block.N @ inverse[np.ix_(its, its)]
+        out += (inverse[:, its] @ np.linalg.solve(left, score[its])) ** 2
+    return out * (len(blocks) - 1.0) / len(blocks)

@@ -22,6 +22,8 @@ _BY_STEP = (
     *("place", "unsure"),
 )
 """Fields that have a value for each step."""
+DRIFT = 3
+"""Column of what is unsure that is the heading's."""
 ROUNDING = 1e-6
 """Of a block: a recording that begins where one does is of that block, however numbers are rounded
 [cost]."""

@@ -21,40 +21,28 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.vehicle.columns import Columns
-from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.effects.attitude_error import DRIFTING
+from onboard.core.vehicle.flight import DRIFT, Flight
 from onboard.core.vehicle.limits import BLOCK_S
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import AxisNoise, whitened
 from onboard.core.vehicle.windows import windows_of
 
 
-def errors_of(model: ForceModel, theta: Array, number: int) -> Array:
-    """(n, k, l) force, m/s^2, by a standard deviation of each error of one flight's motion.
+def errors_of(model: ForceModel, theta: Array) -> list[Array]:
+    """(n, k, l) force, m/s^2, by a standard deviation of each error, of each flight's n steps.
 
     Args:
         model: of k axes.
         theta: (m,) unknowns at which it is asked.
-        number: which of several recordings; the others' steps are zero.
     """
     flight = model.flight
-    mine = flight.part == number
     slope = model.gust_slope(theta)
     u_n = np.einsum("nij,ni->nj", flight.R_bn, model.air(theta).u_b)
-    out = []
-    for shape in _wanders(flight, number):
-        # As seen from the vehicle the air moves the other way: a sign that no square has.
-        out += [slope[:, :, j] * (flight.velocity_sigma * shape)[:, None] for j in range(3)]
-    unsure = np.where(mine[:, None], flight.unsure - flight.unsure[mine].mean(axis=0), 0.0)
-    for j in range(3):
-        if np.any(unsure[:, j]):
-            f_b = np.zeros((len(flight), 3))
-            f_b[:, j] = unsure[:, j]
-            out.append(_felt(model, f_b) + _turned(slope, u_n, _levelled(flight, f_b)))
-    if np.any(unsure[:, 3]):
-        about = np.zeros((len(flight), 3))
-        about[:, 2] = unsure[:, 3]
-        out.append(_turned(slope, u_n, about))
-    return np.stack(out, axis=-1)
+    return [
+        _of_flight(model, slope[its], u_n[its], flight.kept(its))
+        for its in (flight.part == number for number in range(flight.parts))
+    ]
 
 
 def scores_of(
@@ -73,32 +61,49 @@ def scores_of(
         noise: by axis.
         sensitivity: (n, k) to gusts, 1/s.
     """
-    windows = windows_of(model.flight)
-    part = model.flight.part[windows.first]
-    out = []
-    for number in range(model.flight.parts):
-        force = windows.mean(errors_of(model, theta, number))
-        mine, its = part == number, regressors[0].places[number]
+    flight, out = model.flight, []
+    part = flight.part[windows_of(flight).first]
+    for number, errors in enumerate(errors_of(model, theta)):
+        its = flight.part == number
+        windows = windows_of(flight.kept(its))
+        force, sensitive = windows.mean(errors), windows.mean(sensitivity[its])
+        places = regressors[0].places[number]
         scores = np.zeros((len(theta), force.shape[-1]))
         for k, columns in enumerate(regressors):
-            sensitive = windows.mean(sensitivity[:, k])
-            rows = whitened(force[:, k], noise[k], sensitive, windows.piece, windows.length_s)
-            scores[its] += columns.by[mine].T @ rows[mine]
+            data = noise[k], sensitive[:, k], windows.piece, windows.length_s
+            scores[places] += columns.by[part == number].T @ whitened(force[:, k], *data)
         out.append(scores)
     return np.hstack(out)
 
 
-def _wanders(flight: Flight, number: int) -> list[Array]:
+def _of_flight(model: ForceModel, slope: Array, u_n: Array, flight: Flight) -> Array:
+    """(n, k, l) of one flight, of which all arguments but the model are."""
+    out = [
+        slope[:, :, j] * (flight.velocity_sigma * shape)[:, None]
+        for shape in _wanders(flight)
+        for j in range(3)
+    ]
+    unsure = flight.unsure - flight.unsure.mean(axis=0)
+    for j in range(3):
+        f_b = np.zeros((len(flight), 3))
+        f_b[:, j] = unsure[:, j]
+        if np.any(f_b):
+            out.append(_felt(model, f_b) + _turned(slope, u_n, _leant(flight, f_b)))
+    if np.any(unsure[:, DRIFT]) and all(u.name != DRIFTING for u in model.unknowns):
+        about = np.zeros((len(flight), 3))
+        about[:, 2] = unsure[:, DRIFT]
+        out.append(_turned(slope, u_n, about))
+    return np.stack(out, axis=-1)
+
+
+def _wanders(flight: Flight) -> list[Array]:
     """(n,) shapes of a process of variance one that forgets itself in a block's length."""
-    mine = flight.part == number
-    t = flight.t - flight.t[mine][0]
-    last = max(1, math.ceil(float(t[mine][-1]) / BLOCK_S))
-    knots = float(t[mine][-1]) * np.arange(last + 1) / last
+    lasted = float(flight.t[-1] - flight.t[0])
+    last = max(1, math.ceil(lasted / BLOCK_S))
+    knots = flight.t[0] + lasted * np.arange(last + 1) / last
     # Straight lines between independent knots have two thirds of their variance in the mean.
     root = math.sqrt(1.5)
-    return [
-        np.where(mine, root * np.interp(t, knots, unit), 0.0) for unit in np.eye(last + 1)
-    ]
+    return [root * np.interp(flight.t, knots, unit) for unit in np.eye(last + 1)]
 
 
 def _felt(model: ForceModel, f_b: Array) -> Array:
@@ -108,7 +113,7 @@ def _felt(model: ForceModel, f_b: Array) -> Array:
     return out
 
 
-def _levelled(flight: Flight, f_b: Array) -> Array:
+def _leant(flight: Flight, f_b: Array) -> Array:
     """(n, 3) by which an attitude is turned that a receiver holds level, north, east, down, rad.
 
     A force that is not there is leant away: the velocity shows that it was not.

@@ -176,8 +176,7 @@ def _slipping(
     is: errors of a regressor make its slope nothing (W. A. Fuller, *Measurement Error Models*,
     1987, section 1.1), and the wind across is then free.  A rudder that holds the slip tells all
     of it better than the slip itself.  So it has to be seen that the file's force leaves more than
-    such errors make; of a drift of the heading there is one in a flight, which is surely no more
-    than :data:`SURE` of its sigmas.
+    such errors make.
     """
     model, fit = found.model, found.fit
     places = model.indices(SideForce.name)
@@ -187,8 +186,8 @@ def _slipping(
     fit = likelier(form.model(flying, frame, sigma, held=True))
     k = fit.model.axes.index(SIDE)
     slope = np.linalg.norm(fit.model.gust_slope(fit.theta)[:, k], axis=-1)
-    drifts = [errors_of(fit.model, fit.theta, part)[:, k] for part in range(flying.parts)]
-    errors = math.hypot(RECEIVER_M_S * rms(slope), SURE * rms(np.linalg.norm(np.hstack(drifts), axis=1)))
+    made = [np.linalg.norm(of[:, k], axis=-1) for of in errors_of(fit.model, fit.theta)]
+    errors = math.hypot(RECEIVER_M_S * rms(slope), rms(np.concatenate(made)))
     if rms(fit.residual[:, k]) > errors:
         return found
     return matched(fit.model, fit)

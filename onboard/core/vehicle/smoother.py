@@ -151,14 +151,17 @@ def smoothed(steps: Steps, levels: Levels, attitude: Array) -> Smoothed:
     return Smoothed(x, variance)
 
 
-def attitude_known(steps: Steps, levels: Levels, attitude: Array) -> Array:
-    """(3,) how well the attitude is known on the whole, rad; arguments as of :func:`smoothed`.
+def attitude_known(steps: Steps, levels: Levels, attitude: Array) -> tuple[Array, Array]:
+    """How well the attitude is known; arguments as of :func:`smoothed`.
 
-    By the motion, or as well as at the beginning: what the recorded one is off by all flight long
-    is off at every fix, and asking it again and again tells nothing.
+    By the motion, or as well as at the beginning: what the recorded one is off by all flight long,
+    or more and more, is off at every fix, and asking it again and again tells nothing.
+
+    Returns:
+        (3,) on the whole, rad, and (n,) variance of the heading by the motion alone, rad^2.
     """
-    by_motion = smoothed(steps, replace(levels, recorded=NOT_RAD), attitude).sigma[PSI]
-    return np.minimum(by_motion, attitude)
+    by_motion = smoothed(steps, replace(levels, recorded=NOT_RAD), attitude)
+    return np.minimum(by_motion.sigma[PSI], attitude), by_motion.variance[:, HEADING]
 
 
 def _start(attitude: Array) -> Array:

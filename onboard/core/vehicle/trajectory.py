@@ -7,6 +7,7 @@ So the difference of the two, both averaged alike, is what a smoother
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -26,7 +27,6 @@ from onboard.core.vehicle.limits import (
 )
 from onboard.core.vehicle.smoother import (
     BIAS,
-    HEADING,
     PSI,
     Levels,
     Steps,
@@ -110,11 +110,11 @@ class Motion:
         height: (n,) above mean sea level, m.
         velocity_sigma: of the velocity, m/s.
         attitude_sigma: (3,) of the attitude, about north, east and down, rad.
+        fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
+            force and recorded attitude, m/s, but for a constant.
         load_sigma: as that of the sensors.
         heading_drift: (n,) standard deviation of what the heading is off by more and more, with
             its sign from where it is known best, rad.
-        fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
-            force and recorded attitude, m/s, but for a constant.
     """
 
     t: Array
@@ -125,9 +125,14 @@ class Motion:
     height: Array
     velocity_sigma: float
     attitude_sigma: Array
-    load_sigma: Array
-    heading_drift: Array
     fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
+    load_sigma: Array = field(default_factory=lambda: np.zeros(3))
+    heading_drift: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """No drift where nothing is said of one."""
+        if len(self.heading_drift) != len(self.t):
+            object.__setattr__(self, "heading_drift", np.zeros(len(self.t)))
 
     def finer(self, step_s: float) -> Motion:
         """The same motion at even times, where its samples are usually further apart.
@@ -204,6 +209,7 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     errors = smoothed(steps, levels, start)
     v_n = v_n + _at(t, true_t, errors.x[:, V])
     R = rotation_from_vector(_at(t, true_t, errors.x[:, PSI])) @ R
+    attitude_sigma, heading = attitude_known(steps, levels, start)
     return Motion(
         t,
         f_b,
@@ -212,10 +218,10 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         v_n,
         np.interp(t, true_t, fix_h),
         float(np.max(errors.sigma[V])),
-        attitude_known(steps, levels, start),
-        sensors.load_sigma,
-        np.interp(t, true_t, _drift(true_t, errors.variance[:, HEADING])),
+        attitude_sigma,
         (true_t, fix_v - average),
+        sensors.load_sigma,
+        np.interp(t, true_t, _drift(true_t, heading, float(start[2]))),
     )
 
 
@@ -239,16 +245,16 @@ def _steps(at: Array, t: Array, f_n: Array, w_b: Array, R: Array, measured: Arra
     )
 
 
-def _drift(t: Array, variance: Array) -> Array:
+def _drift(t: Array, variance: Array, most: float) -> Array:
     """(n,) rad by which a heading is off more and more, in one standard deviation of that.
 
     Between turns a bias of the gyroscope turns it, at an even rate: from where it is known best the
-    variance (n,), rad^2, grows.
+    variance (n,), rad^2, grows.  A compass holds it to ``most``, rad.
     """
     since = t - t[np.argmin(variance)]
-    size = float(np.sqrt(np.mean(since**2)))
-    more = float(np.mean(variance) - np.min(variance))
-    out: Array = np.sqrt(max(more, 0.0)) * since / max(size, 1e-9)
+    size = math.sqrt(float(np.mean(since**2)))
+    more = math.sqrt(max(float(np.mean(variance) - np.min(variance)), 0.0))
+    out: Array = min(more, most) * since / max(size, 1e-9)
     return out
 
 
