@@ -17,7 +17,7 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
-from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
+from onboard.core.vehicle.instruments import LEAST_TOLD, whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
     FEWEST_BLOCKS,
     FEWEST_FLIGHTS,
@@ -265,11 +265,10 @@ def _level(model: ForceModel, theta: Array) -> Columns | None:
 def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask, considered: Array) -> Array:
     """(m,) variance of the estimate by what is known of its errors, over that of the sums.
 
-    By blocks it is the jackknife's, each left out in turn (R. M. Bell and D. F. McCaffrey, *Survey
-    Methodology* 28, 2002): about an estimate that few blocks have made their scores scatter less
-    than those of flight that it has not seen, and where a number rests on one turn it is that turn
-    which has to be left out to see it.  No unknown has less than the mean of all: a few blocks know
-    single ones badly.
+    By blocks it is the cluster-robust (sandwich) estimate, without what an estimate that few blocks
+    have made takes of their scatter: it passes near to each of them, and nearest to the only one
+    with a turn (R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28, 2002).  No unknown has
+    less than the mean of all: a few blocks know single ones badly.
 
     Errors of one flight go together (its sensors, its load, how well its wind was measured), and
     flights that contradict each other do not show it from block to block: where there are enough of
@@ -293,7 +292,7 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask, consider
     for score, block in zip(scores, blocks, strict=True):
         score[block.places] = block.b
     if len(blocks) >= FEWEST_BLOCKS:
-        ratio = _jackknifed(blocks, _about(scores, held), inverse) / known
+        ratio = _scattered(blocks, _about(scores, held), inverse) / known
         mean = float(np.mean(ratio[told])) if told.any() else 1.0
         out = np.maximum(out, np.maximum(ratio, mean))
     numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
@@ -303,7 +302,9 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask, consider
         np.add.at(of_flights, which, scores)
         moved = inverse @ _about(of_flights, held).T
         out = np.maximum(out, np.sum(moved**2, axis=1) * count / (count - 1.0) / known)
-    return out
+    # What was known before the flight is as sure as it was.
+    more: Array = 1.0 + (out - 1.0) * known / np.diag(inverse)
+    return more
 
 
 def _about(scores: Array, held: Mask) -> Array:
@@ -312,18 +313,27 @@ def _about(scores: Array, held: Mask) -> Array:
     return out
 
 
-def _jackknifed(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:
-    """(m,) variances by leaving each of the blocks out in turn.
+def _scattered(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:
+    """(m,) variances by the scores of the blocks, as large as they are of flight not fitted.
+
+    Scores ``b = L u`` of rows ``N = L L^T`` have a covariance of ``L Q L^T`` about an estimate that
+    these rows have a part in, ``Q = 1 - L^T A^-1 L``: they are ``L Q^-1/2 u`` without it.
 
     Args:
         blocks: c of them.
         scores: (c, m) theirs.
-        inverse: (m, m) of the information of all.
+        inverse: (m, m) of the information of all, ``A^-1``.
     """
     out = np.zeros(len(inverse))
     for score, block in zip(scores, blocks, strict=True):
-        # Without it A - E N E^T is left, and (A - E N E^T)^-1 E = A^-1 E (1 - N E^T A^-1 E)^-1.
         its = block.places
-        left = np.eye(len(its)) - block.N @ inverse[np.ix_(its, its)]
-        out += (inverse[:, its] @ np.linalg.solve(left, score[its])) ** 2
-    return out * (len(blocks) - 1.0) / len(blocks)
+        size = np.sqrt(np.maximum(np.diag(block.N), 1e-300))
+        squares, axes = np.linalg.eigh(block.N / np.outer(size, size))
+        acting = squares > LEAST_TOLD * squares[-1]
+        root = np.sqrt(squares[acting])
+        L = size[:, None] * axes[:, acting] * root
+        u = axes[:, acting].T @ (score[its] / size) / root
+        left, turned = np.linalg.eigh(np.eye(len(u)) - L.T @ inverse[np.ix_(its, its)] @ L)
+        unfitted = turned @ (turned.T @ u / np.sqrt(np.maximum(left, LEAST_TOLD)))
+        out += (inverse[:, its] @ (L @ unfitted)) ** 2
+    return out * len(blocks) / (len(blocks) - 1.0)

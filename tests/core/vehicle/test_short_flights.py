@@ -62,7 +62,9 @@ def test_each_block_is_left_out_in_turn():
     ratio = np.sum(moved**2, axis=0) * 5.0 / 6.0 / known
     got = inflation_of(blocks, prior, np.zeros(m, dtype=bool), np.zeros((m, 1)))
     least = np.mean(ratio[np.diag(inverse) * prior < 0.5])
-    np.testing.assert_allclose(got, np.maximum(np.maximum(ratio, least), 1.0), rtol=1e-6)
+    # The prior's part of a variance is not the flight's, and is as it was.
+    due = np.maximum(np.maximum(ratio, least), 1.0) * known + np.diag(inverse) - known
+    np.testing.assert_allclose(got * np.diag(inverse), due, rtol=1e-6)
 
 
 def test_an_error_of_known_size_adds_what_it_does_to_the_estimate():
