@@ -238,14 +238,17 @@ def _summed(
     # on wind and airspeed is said beside it.
     information = total(sums, m)[0] + np.diag(fit.prior)
     moved = np.linalg.solve(information, fit.considered)
-    moved[[place for places in mine.values() for place in places]] = 0.0
-    considered = information @ moved
+    freed = {place for places in mine.values() for place in places}
+    moved[sorted(freed | {*model.indices(Lift.name), *side_places(model)})] = 0.0
+    considered, held = information @ moved, theta <= model.least
+    inflation, scale = inflation_of(sums, fit.prior, held, considered, settled=False)
     return replace(
         fit,
         theta=theta,
         blocks=tuple(sums),
-        inflation=inflation_of(sums, fit.prior, theta <= model.least, considered),
+        inflation=inflation,
         considered=considered,
+        scale=scale,
         noise=noise,
         residual=residual,
         jacobian=jacobian,

@@ -53,6 +53,7 @@ class Fit:
         block: (n,) number of the block of each step.
         doubt: (m,) by how much laws may be wrong in the unknowns.
         considered: (m, l) what each error of the recorded motion adds to the scores.
+        scale: one inflation for tests of several unknowns: that of the blocks' scores.
         turned: what gusts may have done to the unknowns; None where none are seen.
     """
 
@@ -68,6 +69,7 @@ class Fit:
     block: NDArray[np.int64]
     doubt: Array
     considered: Array
+    scale: float
     turned: Turned | None = None
 
     @property
@@ -102,11 +104,6 @@ class Fit:
         if self.turned is None:
             return laws
         return laws + self.turned.covariance(information, free)
-
-    @property
-    def scale(self) -> float:
-        """One inflation for tests of several unknowns: that of the blocks' scores."""
-        return float(np.median(self.inflation))
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,12 +186,13 @@ def summed(
         h = np.concatenate([columns.by[mine] for columns in by])
         its = int(part[mine][0])
         sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), jacobian.places[its], its))
+    inflation, scale = inflation_of(sums, prior, theta <= model.least, considered)
     return Fit(
         model,
         theta,
         prior,
         tuple(sums),
-        inflation_of(sums, prior, theta <= model.least, considered),
+        inflation,
         tuple(noise),
         residual,
         jacobian,
@@ -202,6 +200,7 @@ def summed(
         block,
         np.zeros(len(theta)),
         considered,
+        scale,
     )
 
 
@@ -262,7 +261,14 @@ def _level(model: ForceModel, theta: Array) -> Columns | None:
     return model.levelled.steps(theta) if model.instrumented else None
 
 
-def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask, considered: Array) -> Array:
+def inflation_of(
+    blocks: Sequence[BlockSums],
+    prior: Array,
+    held: Mask,
+    considered: Array,
+    *,
+    settled: bool = True,
+) -> tuple[Array, float]:
     """(m,) variance of the estimate by what is known of its errors, over that of the sums.
 
     By blocks it is the cluster-robust (sandwich) estimate, without what an estimate that few blocks
@@ -281,30 +287,40 @@ def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask, consider
         prior: (m,) weights.
         held: (m,) whether an unknown is at its bound: its scores have a mean, which is no scatter.
         considered: (m, l) of :attr:`Fit.considered`.
+        settled: whether the estimate is the likeliest by these sums, so that it passes near to each
+            of them.
+
+    Returns:
+        (m,) of the variances, and one for tests of several unknowns: the middle one by the scores
+        as they scatter.
     """
     N = total(blocks, len(prior))[0]
     inverse = np.linalg.inv(N + np.diag(prior))
     known = np.maximum(np.diag(inverse @ N @ inverse), 1e-300)
     told = np.diag(inverse) * prior < 0.5
     moved = inverse @ considered
-    out: Array = 1.0 + np.sum(moved**2, axis=1) / known
+    considerable: Array = 1.0 + np.sum(moved**2, axis=1) / known
     scores = np.zeros((len(blocks), len(prior)))
     for score, block in zip(scores, blocks, strict=True):
         score[block.places] = block.b
-    if len(blocks) >= FEWEST_BLOCKS:
-        ratio = _scattered(blocks, _about(scores, held), inverse) / known
-        mean = float(np.mean(ratio[told])) if told.any() else 1.0
-        out = np.maximum(out, np.maximum(ratio, mean))
+    out = np.ones(len(prior))
+    by_flight = np.ones(len(prior))
     numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
-    count = len(numbers)
-    if count >= FEWEST_FLIGHTS:
-        of_flights = np.zeros((count, len(prior)))
+    if len(numbers) >= FEWEST_FLIGHTS:
+        of_flights = np.zeros((len(numbers), len(prior)))
         np.add.at(of_flights, which, scores)
-        moved = inverse @ _about(of_flights, held).T
-        out = np.maximum(out, np.sum(moved**2, axis=1) * count / (count - 1.0) / known)
+        by_flight = _variances(_about(of_flights, held), inverse) / known
+    by_blocks = [scores, _unfitted(blocks, scores, inverse) if settled else scores]
+    scale = 1.0
+    for every in by_blocks if len(blocks) >= FEWEST_BLOCKS else ():
+        ratio = _variances(_about(every, held), inverse) / known
+        mean = float(np.mean(ratio[told])) if told.any() else 1.0
+        out = np.maximum(np.maximum(ratio, mean), np.maximum(by_flight, 1.0))
+        scale = scale if every is not scores else float(np.median(out))
+    out = np.maximum(out, np.maximum(by_flight, considerable))
     # What was known before the flight is as sure as it was.
     more: Array = 1.0 + (out - 1.0) * known / np.diag(inverse)
-    return more
+    return more, scale
 
 
 def _about(scores: Array, held: Mask) -> Array:
@@ -313,8 +329,14 @@ def _about(scores: Array, held: Mask) -> Array:
     return out
 
 
-def _scattered(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:
-    """(m,) variances by the scores of the blocks, as large as they are of flight not fitted.
+def _variances(scores: Array, inverse: Array) -> Array:
+    """(m,) of an estimate by the scatter of scores (c, m), by the inverse (m, m) information."""
+    out: Array = np.sum((scores @ inverse) ** 2, axis=0)
+    return out * len(scores) / (len(scores) - 1.0)
+
+
+def _unfitted(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:
+    """(c, m) scores of blocks, as large as they are of flight that was not fitted.
 
     Scores ``b = L u`` of rows ``N = L L^T`` have a covariance of ``L Q L^T`` about an estimate that
     these rows have a part in, ``Q = 1 - L^T A^-1 L``: they are ``L Q^-1/2 u`` without it.
@@ -324,8 +346,8 @@ def _scattered(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Ar
         scores: (c, m) theirs.
         inverse: (m, m) of the information of all, ``A^-1``.
     """
-    out = np.zeros(len(inverse))
-    for score, block in zip(scores, blocks, strict=True):
+    out = np.zeros_like(scores)
+    for made, score, block in zip(out, scores, blocks, strict=True):
         its = block.places
         size = np.sqrt(np.maximum(np.diag(block.N), 1e-300))
         squares, axes = np.linalg.eigh(block.N / np.outer(size, size))
@@ -334,6 +356,5 @@ def _scattered(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Ar
         L = size[:, None] * axes[:, acting] * root
         u = axes[:, acting].T @ (score[its] / size) / root
         left, turned = np.linalg.eigh(np.eye(len(u)) - L.T @ inverse[np.ix_(its, its)] @ L)
-        unfitted = turned @ (turned.T @ u / np.sqrt(np.maximum(left, LEAST_TOLD)))
-        out += (inverse[:, its] @ (L @ unfitted)) ** 2
-    return out * len(blocks) / (len(blocks) - 1.0)
+        made[its] = L @ (turned @ (turned.T @ u / np.sqrt(np.maximum(left, LEAST_TOLD))))
+    return out

@@ -153,4 +153,7 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     step = Choices(wide).solved([e.name for e in effects]).x
     there = [replace(b, b=b.b - b.times(step)) for b in wide.blocks]
     held = theta + step <= model.least
-    return replace(wide, inflation=inflation_of(there, wide.prior, held, wide.considered))
+    # What errors of the motion look like is asked by itself.
+    none = np.zeros((len(theta), 1))
+    inflation, scale = inflation_of(there, wide.prior, held, none, settled=False)
+    return replace(wide, inflation=inflation, scale=scale)

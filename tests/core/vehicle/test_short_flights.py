@@ -15,7 +15,7 @@ from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.block_sums import BlockSums
 from onboard.core.vehicle.copter import copter_model
-from onboard.core.vehicle.fit import fitted, inflation_of
+from onboard.core.vehicle.fit import _unfitted, fitted, inflation_of
 from onboard.core.vehicle.flight import DRIFT
 from onboard.core.vehicle.motion_errors import errors_of
 from onboard.core.vehicle.plane import plane_model
@@ -38,33 +38,32 @@ def turned(flight, about):
     return replace(flight, R_bn=R_bn, v_b=np.einsum("nij,nj->ni", R_bn, flight.v_n))
 
 
-def test_each_block_is_left_out_in_turn():
-    """Variances are those of estimates by all blocks but one."""
-    rng = np.random.default_rng(2)
-    m, prior = 4, np.array([1e-3, 1e-3, 1e-3, 50.0])
-    rows = [(rng.normal(size=(12, m)), rng.normal(size=12)) for _ in range(6)]
-
-    def told(some):
-        H, y = (np.concatenate(x) for x in zip(*some, strict=True))
-        return np.linalg.solve(H.T @ H + np.diag(prior), H.T @ y), np.linalg.inv(
-            H.T @ H + np.diag(prior)
-        )
-
-    theta, inverse = told(rows)
-    blocks = [
-        BlockSums(H.T @ H, H.T @ (y - H @ theta), float(y @ y), len(y), np.arange(m))
-        for H, y in rows
-    ]
-    # Prior pulls theta to zero: what the others say is by the same pull.
-    moved = np.array([told(rows[:k] + rows[k + 1 :])[0] - theta for k in range(6)])
-    N = np.linalg.inv(inverse) - np.diag(prior)
-    known = np.diag(inverse @ N @ inverse)
-    ratio = np.sum(moved**2, axis=0) * 5.0 / 6.0 / known
-    got = inflation_of(blocks, prior, np.zeros(m, dtype=bool), np.zeros((m, 1)))
-    least = np.mean(ratio[np.diag(inverse) * prior < 0.5])
-    # The prior's part of a variance is not the flight's, and is as it was.
-    due = np.maximum(np.maximum(ratio, least), 1.0) * known + np.diag(inverse) - known
-    np.testing.assert_allclose(got * np.diag(inverse), due, rtol=1e-6)
+def test_scatter_of_few_blocks_is_that_of_flight_that_was_not_fitted():
+    """Of rows of unit variance it is one in the mean, however much of a number one block tells."""
+    m, prior = 4, np.full(4, 1e-6)
+    none = np.zeros(m, dtype=bool)
+    got, plain = [], []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        rows = [rng.normal(size=(12, m)) for _ in range(6)]
+        rows[2][:, 3] *= 5.0  # the one turn
+        every, y = np.concatenate(rows), rng.normal(size=72)
+        theta = np.linalg.solve(every.T @ every + np.diag(prior), every.T @ y)
+        left = np.split(y - every @ theta, 6)
+        blocks = [
+            BlockSums(H.T @ H, H.T @ r, float(r @ r), len(r), np.arange(m))
+            for H, r in zip(rows, left, strict=True)
+        ]
+        inverse = np.linalg.inv(every.T @ every + np.diag(prior))
+        scores = np.stack([block.b for block in blocks])
+        unfitted = _unfitted(blocks, scores, inverse)
+        got.append(np.sum((unfitted @ inverse) ** 2, axis=0) / np.diag(inverse))
+        plain.append(np.sum((scores @ inverse) ** 2, axis=0) / np.diag(inverse))
+        inflation, _ = inflation_of(blocks, prior, none, np.zeros((m, 1)))
+        assert np.all(inflation >= 1.0)
+    np.testing.assert_allclose(np.mean(got, axis=0), 1.0, atol=0.15)
+    # As they are, a number by one turn would be told from nothing.
+    assert np.mean(plain, axis=0)[3] < 0.5
 
 
 def test_an_error_of_known_size_adds_what_it_does_to_the_estimate():
@@ -72,7 +71,7 @@ def test_an_error_of_known_size_adds_what_it_does_to_the_estimate():
     prior, N = np.full(2, 1e-6), np.diag([4.0, 100.0])
     blocks = [BlockSums(N / 4.0, np.zeros(2), 1.0, 10, np.arange(2)) for _ in range(4)]
     error = np.array([[4.0 * 3.0], [0.0]])
-    got = inflation_of(blocks, prior, np.zeros(2, dtype=bool), error)
+    got, _ = inflation_of(blocks, prior, np.zeros(2, dtype=bool), error)
     np.testing.assert_allclose(got / np.diag(N), [1.0 / 4.0 + 9.0, 1.0 / 100.0], rtol=1e-4)
 
 
