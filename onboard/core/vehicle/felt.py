@@ -35,7 +35,8 @@ from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
-from onboard.core.vehicle.fit import Fit, inflation_of
+from onboard.core.vehicle.fit import Fit
+from onboard.core.vehicle.inflation import inflation_of
 from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import SETTLED
 from onboard.core.vehicle.model import GUST, ForceModel

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
-from onboard.core.vehicle.instruments import LEAST_TOLD, whitened_regressors, whitened_residual
+from onboard.core.vehicle.inflation import inflation_of
+from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
-    FEWEST_BLOCKS,
-    FEWEST_FLIGHTS,
     LEAST_SHARE,
     MORE_ROUNDS,
     NOISE_ROUNDS,
@@ -259,102 +258,3 @@ def _settled(
 def _level(model: ForceModel, theta: Array) -> Columns | None:
     """(n, k) derivatives without a tilt; None where they are not needed."""
     return model.levelled.steps(theta) if model.instrumented else None
-
-
-def inflation_of(
-    blocks: Sequence[BlockSums],
-    prior: Array,
-    held: Mask,
-    considered: Array,
-    *,
-    settled: bool = True,
-) -> tuple[Array, float]:
-    """(m,) variance of the estimate by what is known of its errors, over that of the sums.
-
-    By blocks it is the cluster-robust (sandwich) estimate, without what an estimate that few blocks
-    have made takes of their scatter: it passes near to each of them, and nearest to the only one
-    with a turn (R. M. Bell and D. F. McCaffrey, *Survey Methodology* 28, 2002).  No unknown has
-    less than the mean of all: a few blocks know single ones badly.
-
-    Errors of one flight go together (its sensors, its load, how well its wind was measured), and
-    flights that contradict each other do not show it from block to block: where there are enough of
-    them, their scores' scatter counts, too, if it is the larger (what is a flight's own no other
-    one tells, so none is left out).  And so do errors of known size of the
-    motion, which a short flight does not show by any scatter.
-
-    Args:
-        blocks: sums about the estimate.
-        prior: (m,) weights.
-        held: (m,) whether an unknown is at its bound: its scores have a mean, which is no scatter.
-        considered: (m, l) of :attr:`Fit.considered`.
-        settled: whether the estimate is the likeliest by these sums, so that it passes near to each
-            of them.
-
-    Returns:
-        (m,) of the variances, and one for tests of several unknowns: the middle one by the scores
-        as they scatter.
-    """
-    N = total(blocks, len(prior))[0]
-    inverse = np.linalg.inv(N + np.diag(prior))
-    known = np.maximum(np.diag(inverse @ N @ inverse), 1e-300)
-    told = np.diag(inverse) * prior < 0.5
-    moved = inverse @ considered
-    considerable: Array = 1.0 + np.sum(moved**2, axis=1) / known
-    scores = np.zeros((len(blocks), len(prior)))
-    for score, block in zip(scores, blocks, strict=True):
-        score[block.places] = block.b
-    out = np.ones(len(prior))
-    by_flight = np.ones(len(prior))
-    numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
-    if len(numbers) >= FEWEST_FLIGHTS:
-        of_flights = np.zeros((len(numbers), len(prior)))
-        np.add.at(of_flights, which, scores)
-        by_flight = _variances(_about(of_flights, held), inverse) / known
-    by_blocks = [scores, _unfitted(blocks, scores, inverse) if settled else scores]
-    scale = 1.0
-    for every in by_blocks if len(blocks) >= FEWEST_BLOCKS else ():
-        ratio = _variances(_about(every, held), inverse) / known
-        mean = float(np.mean(ratio[told])) if told.any() else 1.0
-        out = np.maximum(np.maximum(ratio, mean), np.maximum(by_flight, 1.0))
-        scale = scale if every is not scores else float(np.median(out))
-    out = np.maximum(out, np.maximum(by_flight, considerable))
-    # What was known before the flight is as sure as it was.
-    more: Array = 1.0 + (out - 1.0) * known / np.diag(inverse)
-    return more, scale
-
-
-def _about(scores: Array, held: Mask) -> Array:
-    """Scores (c, m) less their mean where they have one."""
-    out: Array = scores - np.where(held, np.mean(scores, axis=0), 0.0)
-    return out
-
-
-def _variances(scores: Array, inverse: Array) -> Array:
-    """(m,) of an estimate by the scatter of scores (c, m), by the inverse (m, m) information."""
-    out: Array = np.sum((scores @ inverse) ** 2, axis=0)
-    return out * len(scores) / (len(scores) - 1.0)
-
-
-def _unfitted(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:
-    """(c, m) scores of blocks, as large as they are of flight that was not fitted.
-
-    Scores ``b = L u`` of rows ``N = L L^T`` have a covariance of ``L Q L^T`` about an estimate that
-    these rows have a part in, ``Q = 1 - L^T A^-1 L``: they are ``L Q^-1/2 u`` without it.
-
-    Args:
-        blocks: c of them.
-        scores: (c, m) theirs.
-        inverse: (m, m) of the information of all, ``A^-1``.
-    """
-    out = np.zeros_like(scores)
-    for made, score, block in zip(out, scores, blocks, strict=True):
-        its = block.places
-        size = np.sqrt(np.maximum(np.diag(block.N), 1e-300))
-        squares, axes = np.linalg.eigh(block.N / np.outer(size, size))
-        acting = squares > LEAST_TOLD * squares[-1]
-        root = np.sqrt(squares[acting])
-        L = size[:, None] * axes[:, acting] * root
-        u = axes[:, acting].T @ (score[its] / size) / root
-        left, turned = np.linalg.eigh(np.eye(len(u)) - L.T @ inverse[np.ix_(its, its)] @ L)
-        made[its] = L @ (turned @ (turned.T @ u / np.sqrt(np.maximum(left, LEAST_TOLD))))
-    return out

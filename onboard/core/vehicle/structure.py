@@ -25,8 +25,9 @@ from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
-from onboard.core.vehicle.fit import Fit, Slopes, inflation_of, slopes_at, summed
+from onboard.core.vehicle.fit import Fit, Slopes, slopes_at, summed
 from onboard.core.vehicle.gust_errors import rising
+from onboard.core.vehicle.inflation import inflation_of
 from onboard.core.vehicle.limits import FALSE_ALARM, RECEIVER_M_S, SURE
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.places import FORCE

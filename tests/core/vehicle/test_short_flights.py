@@ -15,8 +15,9 @@ from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.block_sums import BlockSums
 from onboard.core.vehicle.copter import copter_model
-from onboard.core.vehicle.fit import _unfitted, fitted, inflation_of
+from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import DRIFT
+from onboard.core.vehicle.inflation import inflation_of, unfitted
 from onboard.core.vehicle.motion_errors import errors_of
 from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
@@ -56,8 +57,8 @@ def test_scatter_of_few_blocks_is_that_of_flight_that_was_not_fitted():
         ]
         inverse = np.linalg.inv(every.T @ every + np.diag(prior))
         scores = np.stack([block.b for block in blocks])
-        unfitted = _unfitted(blocks, scores, inverse)
-        got.append(np.sum((unfitted @ inverse) ** 2, axis=0) / np.diag(inverse))
+        made = unfitted(blocks, scores, inverse)
+        got.append(np.sum((made @ inverse) ** 2, axis=0) / np.diag(inverse))
         plain.append(np.sum((scores @ inverse) ** 2, axis=0) / np.diag(inverse))
         inflation, _ = inflation_of(blocks, prior, none, np.zeros((m, 1)))
         assert np.all(inflation >= 1.0)
