@@ -49,15 +49,16 @@ def inflation_of(
         scores as they scatter.
     """
     N = total(blocks, len(prior))[0]
-    inverse: Array = np.linalg.inv(N + np.diag(prior))
+    information: Array = N + np.diag(prior)
+    inverse: Array = np.linalg.inv(information)
     known: Array = np.maximum(np.diag(inverse @ N @ inverse), TINY)
     told: Mask = np.diag(inverse) * prior < 0.5
     scores = np.zeros((len(blocks), len(prior)))
     for score, block in zip(scores, blocks, strict=True):
         score[block.places] = block.b
     least = _by_flights(blocks, scores, held, inverse) / known
-    plain = np.maximum(_by_blocks(scores, held, inverse, known, told), least)
-    out = plain
+    plain: Array = np.maximum(_by_blocks(scores, held, inverse, known, told), least)
+    out: Array = plain
     if settled:
         as_unfitted = unfitted(blocks, scores, inverse)
         out = np.maximum(_by_blocks(as_unfitted, held, inverse, known, told), least)
