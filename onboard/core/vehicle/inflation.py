@@ -49,8 +49,7 @@ def inflation_of(
         scores as they scatter.
     """
     N = total(blocks, len(prior))[0]
-    information: Array = N + np.diag(prior)
-    inverse: Array = np.linalg.inv(information)
+    inverse: Array = np.asarray(np.linalg.inv(N + np.diag(prior)), dtype=np.float64)
     known: Array = np.maximum(np.diag(inverse @ N @ inverse), TINY)
     told: Mask = np.diag(inverse) * prior < 0.5
     scores = np.zeros((len(blocks), len(prior)))
