@@ -22,7 +22,7 @@ from onboard.answers.stands import fixes_of, said_to_stand, with_landings, witho
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.mean_force import mean_force_sigma
+from onboard.core.estimate.mean_force import load_sigma, mean_force_sigma
 from onboard.core.estimate.misread import attitude_error, misread_of
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S
@@ -39,6 +39,7 @@ from onboard.core.inputs.samples import (
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.repeats import measured
@@ -55,6 +56,8 @@ second and a vehicle more slowly, so that what is faster is vibration [physics].
 UNKNOWN_FORCE: Final = 0.05
 """Sigma of the force on each axis, m/s^2, where the sensor level found nothing: the offset's sigma
 that a calibration has to reach; a sensor without one may be off by ten times that [tuned]."""
+UNKNOWN_LOAD: Final = UNKNOWN_FORCE / STANDARD_GRAVITY
+"""The same of how it changes with the load, by the load: as much at a gravity [physics]."""
 LEAST_FORCE: Final = 0.002
 """Sigma of the force that no calibration goes below, m/s^2: numbers of 16 bits for 16 g either way
 are in steps of 0.005, which are rounded by 0.0014 RMS [physics]."""
@@ -313,9 +316,10 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
     if diagnosis.silent or engine is None:
         scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
         sigma = np.full(3, UNKNOWN_FORCE)
+        by_load = np.full(3, UNKNOWN_LOAD)
     else:
         scale, offset = np.array(c.scale), np.array(c.offset)
-        sigma = _force_sigma(engine)
+        sigma, by_load = _force_sigma(engine), _load_sigma(engine)
         misread, turned = misread_of(engine), attitude_error(engine)
     tilt, tilt_sigma = turned or (np.zeros(3), UNKNOWN_TILT)
     return Sensors(
@@ -329,6 +333,7 @@ def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
         misread,
         tilt,
         tilt_sigma,
+        by_load,
     )
 
 
@@ -338,6 +343,15 @@ def _force_sigma(engine: Engine) -> Array:
     if sigma is None:
         return np.full(3, UNKNOWN_FORCE)
     out: Array = np.where(np.isfinite(sigma), np.maximum(sigma, LEAST_FORCE), UNKNOWN_FORCE)
+    return out
+
+
+def _load_sigma(engine: Engine) -> Array:
+    """(3,) of how the force that was measured changes with the load, by the load."""
+    sigma = load_sigma(engine)
+    if sigma is None:
+        return np.full(3, UNKNOWN_LOAD)
+    out: Array = np.where(np.isfinite(sigma), sigma, UNKNOWN_LOAD)
     return out
 
 

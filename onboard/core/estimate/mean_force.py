@@ -22,6 +22,8 @@ from onboard.core.maths.arrays import Array, Mask
 from onboard.core.model.quadrature import NodeMaker
 
 SIX = "six"
+LEAST_LOAD = 0.01
+"""A force that changes by less over a flight, m/s^2, has nothing to be wrong by [physics]."""
 Chosen = Callable[[Batch, Array], Mask]
 """Which of some times (n,), s, of a batch count."""
 
@@ -72,6 +74,48 @@ def mean_force_sigma(engine: Engine) -> Array | None:
     floor = (SCALE_FLOOR * raw) ** 2 + (OFFSET_FLOOR * six[:3]) ** 2
     C = columns @ solution.covariance @ columns.T + np.diag(floor)
     out: Array = np.sqrt(np.diag(R_bs @ C @ R_bs.T))
+    return out
+
+
+def load_sigma(engine: Engine) -> Array | None:
+    """(3,) of a force by the load, body axes, 1: what its change over a flight leaves unknown.
+
+    A flight that holds its load tells scale and offset together and not apart: the mean force is
+    known, and by how much it is more in a climb than in a descent is not.
+
+    Args:
+        engine: has its flight and its sums; None if it has neither.
+    """
+    model, solution = engine.model, engine.solution()
+    if solution is None:
+        return None
+    C = solution.covariance.copy()
+    for family in model.families:
+        if not family.is_read:
+            its = model.slices[family.name]
+            C[its] = C[:, its] = 0.0
+    added, felt = [], []
+    before: Segment | None = None
+    for batch in engine.batches:
+        known = {} if batch.fresh or before is None else before.slow
+        segment = before = model.remembering(batch.segment, known)
+        mine = (segment.t >= batch.fixes.t[0]) & (segment.t < batch.fixes.t[-1])
+        if not mine.any():
+            continue
+        # Loads change over seconds, and what shakes is not asked for.
+        t = segment.t[mine]
+        first = np.flatnonzero(np.diff(np.floor(t), prepend=-np.inf))
+        counts = np.diff(np.append(first, len(t)))[:, None]
+        made = np.add.reduceat(_added(engine, segment, t), first) / counts[:, None]
+        loads = np.add.reduceat(segment.raw_s[mine], first) / counts
+        added.append(segment.R_bs @ made)
+        felt.append(loads @ segment.R_bs.T)
+    if not added:
+        return None
+    A, felt_b = np.concatenate(added), np.concatenate(felt)
+    A, felt_b = A - A.mean(axis=0), felt_b - felt_b.mean(axis=0)
+    variance = np.mean(np.einsum("nij,jk,nik->ni", A, C, A, optimize=True), axis=0)
+    out: Array = np.sqrt(variance / np.maximum(np.mean(felt_b**2, axis=0), LEAST_LOAD**2))
     return out
 
 

@@ -7,7 +7,7 @@ so is what is only estimated beside the effects.  Two flights whose chi-square
 number of pairs, contradict each other.
 
 Where there are enough flights to tell by how much flights differ, that is in the sigmas of all
-(:func:`onboard.core.vehicle.fit.inflation_of`): then only those contradict each other that do
+(:func:`onboard.core.vehicle.inflation.inflation_of`): then only those contradict each other that do
 beyond what most of them differ by.
 
 The answer is about the first flight.  What contradicts it is set aside; of the others that

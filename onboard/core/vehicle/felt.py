@@ -26,7 +26,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.across import Rows, across, side_places, whitened_axis
 from onboard.core.vehicle.air import AHEAD, SIDE, UP
-from onboard.core.vehicle.block_sums import BlockSums
+from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.drag import Drag
@@ -35,7 +35,8 @@ from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
 from onboard.core.vehicle.effects.slip_drag import SlipDrag
 from onboard.core.vehicle.effects.wind import Wind
-from onboard.core.vehicle.fit import Fit, inflation_of
+from onboard.core.vehicle.fit import Fit
+from onboard.core.vehicle.inflation import inflation_of
 from onboard.core.vehicle.instruments import whitened_rows
 from onboard.core.vehicle.limits import SETTLED
 from onboard.core.vehicle.model import GUST, ForceModel
@@ -234,11 +235,21 @@ def _summed(
         y, h = block[:, 0], block[:, 1:]
         of = int(part[here][0])
         sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), np.arange(m), of))
+    # What is told by these rows is freed from errors of the angles in another way, and how it leans
+    # on wind and airspeed is said beside it.
+    information = total(sums, m)[0] + np.diag(fit.prior)
+    moved = np.linalg.solve(information, fit.considered)
+    freed = {place for places in mine.values() for place in places}
+    moved[sorted(freed | {*model.indices(Lift.name), *side_places(model)})] = 0.0
+    considered, held = information @ moved, theta <= model.least
+    inflation, scale = inflation_of(sums, fit.prior, held, considered, settled=False)
     return replace(
         fit,
         theta=theta,
         blocks=tuple(sums),
-        inflation=inflation_of(sums, fit.prior, theta <= model.least),
+        inflation=inflation,
+        considered=considered,
+        scale=scale,
         noise=noise,
         residual=residual,
         jacobian=jacobian,

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
+from onboard.core.vehicle.inflation import inflation_of
 from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
-    FEWEST_BLOCKS,
     LEAST_SHARE,
     MORE_ROUNDS,
     NOISE_ROUNDS,
@@ -29,6 +29,7 @@ from onboard.core.vehicle.limits import (
     STALE,
 )
 from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.motion_errors import scores_of
 from onboard.core.vehicle.noise import AxisNoise, fitted_noise
 from onboard.core.vehicle.turned import Turned
 from onboard.core.vehicle.windows import windows_of
@@ -50,6 +51,8 @@ class Fit:
         sensitivity: (n, k) to gusts, 1/s.
         block: (n,) number of the block of each step.
         doubt: (m,) by how much laws may be wrong in the unknowns.
+        considered: (m, l) what each error of the recorded motion adds to the scores.
+        scale: one inflation for tests of several unknowns: that of the blocks' scores.
         turned: what gusts may have done to the unknowns; None where none are seen.
     """
 
@@ -64,6 +67,8 @@ class Fit:
     sensitivity: Array
     block: NDArray[np.int64]
     doubt: Array
+    considered: Array
+    scale: float
     turned: Turned | None = None
 
     @property
@@ -98,11 +103,6 @@ class Fit:
         if self.turned is None:
             return laws
         return laws + self.turned.covariance(information, free)
-
-    @property
-    def scale(self) -> float:
-        """One inflation for tests of several unknowns: that of the blocks' scores."""
-        return float(np.median(self.inflation))
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +176,7 @@ def summed(
     block = np.repeat(of_row, windows.counts)
     left = whitened_residual(model, residual, noise, sensitivity)
     by = whitened_regressors(model, jacobian, noise, sensitivity, level)
+    considered = scores_of(model, theta, by, noise, sensitivity)
     part = model.flight.part[windows.first]
     sums = []
     for number in np.unique(of_row):
@@ -184,18 +185,21 @@ def summed(
         h = np.concatenate([columns.by[mine] for columns in by])
         its = int(part[mine][0])
         sums.append(BlockSums(h.T @ h, h.T @ y, float(y @ y), len(y), jacobian.places[its], its))
+    inflation, scale = inflation_of(sums, prior, theta <= model.least, considered)
     return Fit(
         model,
         theta,
         prior,
         tuple(sums),
-        inflation_of(sums, prior, theta <= model.least),
+        inflation,
         tuple(noise),
         residual,
         jacobian,
         sensitivity,
         block,
         np.zeros(len(theta)),
+        considered,
+        scale,
     )
 
 
@@ -254,36 +258,3 @@ def _settled(
 def _level(model: ForceModel, theta: Array) -> Columns | None:
     """(n, k) derivatives without a tilt; None where they are not needed."""
     return model.levelled.steps(theta) if model.instrumented else None
-
-
-def inflation_of(blocks: Sequence[BlockSums], prior: Array, held: Mask) -> Array:
-    """(m,) variance of the estimate by the scatter of the scores, over that of the sums.
-
-    The cluster-robust (sandwich) estimate; K.-Y. Liang and S. L. Zeger, Biometrika 73 (1986).
-    Each unknown has its own, but none less than the mean of all: a few blocks know single ones
-    badly.  Errors of one flight go together (its sensors, its load, how well its wind was
-    measured), and flights that contradict each other do not show it from block to block: where
-    there are enough of them, their scores' scatter counts, too, if it is the larger.  The scores of
-    what is ``held`` (m,) at its bound have a mean, which is no scatter.
-    """
-    m = len(prior)
-    inverse = np.linalg.inv(total(blocks, m)[0] + np.diag(prior))
-    known = np.diag(inverse @ (np.linalg.inv(inverse) - np.diag(prior)) @ inverse)
-    told = np.diag(inverse) * prior < 0.5
-    scores = np.zeros((len(blocks), m))
-    for score, block in zip(scores, blocks, strict=True):
-        score[block.places] = block.b
-    numbers, which = np.unique([b.part for b in blocks], return_inverse=True)
-    of_flights = np.zeros((len(numbers), m))
-    np.add.at(of_flights, which, scores)
-    out = np.ones(m)
-    for by_block, every in ((True, scores), (False, of_flights)):
-        count = len(every)
-        clusters = every - np.where(held, np.mean(every, axis=0), 0.0)
-        if count < FEWEST_BLOCKS:
-            continue
-        robust = inverse @ (clusters.T @ clusters) @ inverse * count / (count - 1.0)
-        ratio = np.diag(robust) / np.maximum(known, 1e-300)
-        mean = float(np.mean(ratio[told])) if told.any() and by_block else 1.0
-        out = np.maximum(out, np.maximum(ratio, mean))
-    return out

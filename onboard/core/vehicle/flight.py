@@ -19,9 +19,11 @@ from onboard.core.vehicle.trajectory import Motion
 _BY_STEP = (
     *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
     *("outputs", "commands", "battery", "airspeed", "ekf_wind", "measured_wind", "part"),
-    "place",
+    *("place", "unsure"),
 )
 """Fields that have a value for each step."""
+DRIFT = 3
+"""Column of what is unsure that is the heading's."""
 ROUNDING = 1e-6
 """Of a block: a recording that begins where one does is of that block, however numbers are rounded
 [cost]."""
@@ -65,6 +67,9 @@ class Flight:
         measured_wind: (n, 3) towards north and east, and its sigma, m/s; or empty (n, 0).
         part: (n,) which of several recordings a step is of (:mod:`onboard.core.vehicle.several`).
         rest_volts: of the battery before the flight began, V; NaN where nobody saw it.
+        unsure: (n, 4) a standard deviation of what the sensor level leaves of the force as the load
+            changes, body axes, m/s^2, each with the load's sign, and of the heading as it drifts,
+            rad.
         step_s: length of a step, s.
         ground_seen: whether it began or ended on the ground, so that heights above it are known.
         history: of the commands; None where they are those of the flight alone.
@@ -92,6 +97,7 @@ class Flight:
     attitude_sigma: Array
     measured_wind: Array = field(default_factory=lambda: np.zeros((0, 0)))
     part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    unsure: Array = field(default_factory=lambda: np.zeros((0, 4)))
     rest_volts: float = math.nan
     step_s: float = STEP_S
     ground_seen: bool = True
@@ -107,6 +113,8 @@ class Flight:
             object.__setattr__(self, "part", np.zeros(n, dtype=np.int64))
         if len(self.measured_wind) != n:
             object.__setattr__(self, "measured_wind", np.zeros((n, 0)))
+        if len(self.unsure) != n:
+            object.__setattr__(self, "unsure", np.zeros((n, 4)))
         if len(self.place) != n:
             object.__setattr__(self, "place", np.arange(n))
 
@@ -224,6 +232,7 @@ def flight_of(
         airspeed=joined["airspeed"],
         ekf_wind=joined["ekf_wind"],
         measured_wind=joined["measured_wind"],
+        unsure=joined["unsure"],
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
         history=History(joined["commands"], joined["piece"].astype(np.int64)),
         unheard_s=STEP_S * float(np.count_nonzero(flown & ~air & ~dead)),
@@ -287,4 +296,5 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
         "airspeed": airspeed[:, 0] if airspeed.shape[1] else np.full(n, np.nan),
         "ekf_wind": wind,
         "measured_wind": measured,
+        "unsure": mean(np.column_stack([m.f_b * m.load_sigma, m.heading_drift])),
     }

@@ -14,12 +14,18 @@ from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond, beyond_of, spoilt_by
-from onboard.core.vehicle.effects.wind import Wind
+from onboard.core.vehicle.effects.wind import FLOOR_M_S, Wind
 from onboard.core.vehicle.effects.wind_change import WindChange
 from onboard.core.vehicle.felt import felt_across, felt_by
 from onboard.core.vehicle.fit import Fit, fitted
 from onboard.core.vehicle.gust_errors import rising, turned_by_gusts
-from onboard.core.vehicle.limits import LEAVING_ROUNDS, MOST_OUTLYING, OUTLYING, RECEIVER_M_S
+from onboard.core.vehicle.limits import (
+    LEAVING_ROUNDS,
+    MOST_OUTLYING,
+    OUTLYING,
+    RECEIVER_M_S,
+    SURE,
+)
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import likelihood
 from onboard.core.vehicle.propeller_doubt import propeller_doubt
@@ -106,7 +112,7 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
             done = free
     fit, model = done.fit, done.fit.model
     choices = Choices(fit)
-    chosen = _blowing(model, choose(choices))
+    chosen = _blowing(fit, choose(choices))
     nominal = model.measured() - model.predicted(model.nominal)
     of_all = replace(model, flight=whole)
     spans = not_used(of_all, fit, done.kept, done.turbulence.largest)
@@ -127,10 +133,9 @@ def matched(model: ForceModel, first: Fit | None = None) -> Matched:
     )
 
 
-def _blowing(model: ForceModel, chosen: Chosen) -> Chosen:
+def _blowing(fit: Fit, chosen: Chosen) -> Chosen:
     """With the wind named where it changes: its two halves may cancel in the mean that it has."""
-    changes = any(isinstance(e, WindChange) for e in model.effects)
-    if not changes or Wind.name in (*chosen.effects, *chosen.untestable):
+    if Wind.name in (*chosen.effects, *chosen.untestable) or not _becomes_another(fit):
         return chosen
     return replace(
         chosen,
@@ -138,6 +143,24 @@ def _blowing(model: ForceModel, chosen: Chosen) -> Chosen:
         gains=chosen.gains | {Wind.name: 0.0},
         rivals=chosen.rivals | {Wind.name: ()},
     )
+
+
+def _becomes_another(fit: Fit) -> bool:
+    """Whether the wind changes by surely more than matters."""
+    at = 0
+    for effect in fit.model.effects:
+        places = np.arange(at, at + len(effect.unknowns))
+        at += len(effect.unknowns)
+        if not isinstance(effect, WindChange):
+            continue
+        for its in places.reshape(2, -1):
+            most, least = its[np.argmax(fit.theta[its])], its[np.argmin(fit.theta[its])]
+            way = np.zeros(len(fit.theta))
+            way[most], way[least] = 1.0, -1.0
+            sigma = math.sqrt(max(float(way @ fit.covariance @ way), 0.0))
+            if float(way @ fit.theta) > FLOOR_M_S + SURE * sigma:
+                return True
+    return False
 
 
 @dataclass(frozen=True, slots=True)

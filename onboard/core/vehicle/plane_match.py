@@ -25,6 +25,7 @@ from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S,
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, likelier, matched
 from onboard.core.vehicle.model import ForceModel
+from onboard.core.vehicle.motion_errors import errors_of
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.plane import has_airspeed, plane_missing, plane_model, unstalled
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
@@ -171,18 +172,23 @@ def _slipping(
 ) -> Matched:
     """The same, but with the file's side force where the flight slips too little to tell it.
 
-    Where sideslip is no more than errors of the velocity, a force of none fits whatever the force
+    Where sideslip is no more than errors of the motion, a force of none fits whatever the force
     is: errors of a regressor make its slope nothing (W. A. Fuller, *Measurement Error Models*,
-    1987, section 1.1), and the wind across is then free.  So it has to be seen that the file's
-    force leaves more than such errors make.
+    1987, section 1.1), and the wind across is then free.  A rudder that holds the slip tells all
+    of it better than the slip itself.  So it has to be seen that the file's force leaves more than
+    such errors make.
     """
-    if SideForce.name not in found.chosen.effects:
+    model, fit = found.model, found.fit
+    places = model.indices(SideForce.name)
+    apart = np.abs(fit.theta - model.nominal)[places]
+    if not np.any(apart > [model.unknowns[k].floor for k in places]):
         return found
     fit = likelier(form.model(flying, frame, sigma, held=True))
     k = fit.model.axes.index(SIDE)
     slope = np.linalg.norm(fit.model.gust_slope(fit.theta)[:, k], axis=-1)
-    errors = math.hypot(RECEIVER_M_S, flying.velocity_sigma)
-    if rms(fit.residual[:, k]) > errors * rms(slope):
+    made = [np.linalg.norm(of[:, k], axis=-1) for of in errors_of(fit.model, fit.theta)]
+    errors = math.hypot(RECEIVER_M_S * rms(slope), rms(np.concatenate(made)))
+    if rms(fit.residual[:, k]) > errors:
         return found
     return matched(fit.model, fit)
 

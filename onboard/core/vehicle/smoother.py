@@ -19,6 +19,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import skew
 
 V, PSI, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)
+HEADING: Final = 5
 STATES: Final = 9
 START_M_S, START_RAD_S = 1.0, 0.01
 """Standard deviations of velocity and bias at the beginning [physics]."""
@@ -75,10 +76,16 @@ class Levels:
 
 @dataclass(frozen=True, slots=True)
 class Smoothed:
-    """(n, 9) errors at the fixes, and their mean standard deviations (9,)."""
+    """(n, 9) errors at the fixes, and their variances there."""
 
     x: Array
-    sigma: Array
+    variance: Array
+
+    @property
+    def sigma(self) -> Array:
+        """(9,) mean standard deviations."""
+        out: Array = np.sqrt(np.maximum(np.mean(self.variance, axis=0), 0.0))
+        return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,23 +141,27 @@ def smoothed(steps: Steps, levels: Levels, attitude: Array) -> Smoothed:
     f = _filtered(steps, levels, _start(attitude))
     n = len(steps.dt)
     x, P = f.means.copy(), f.covariances[-1]
-    variance = np.diag(P).copy()
+    variance = np.empty((n, STATES))
+    variance[-1] = np.diag(P)
     for k in range(n - 2, -1, -1):
         gain = np.linalg.solve(f.ahead_covariances[k + 1], f.moves[k + 1] @ f.covariances[k]).T
         x[k] = f.means[k] + gain @ (x[k + 1] - f.ahead_means[k + 1])
         P = f.covariances[k] + gain @ (P - f.ahead_covariances[k + 1]) @ gain.T
-        variance += np.diag(P)
-    return Smoothed(x, np.sqrt(np.maximum(variance / n, 0.0)))
+        variance[k] = np.diag(P)
+    return Smoothed(x, variance)
 
 
-def attitude_known(steps: Steps, levels: Levels, attitude: Array) -> Array:
-    """(3,) how well the attitude is known on the whole, rad; arguments as of :func:`smoothed`.
+def attitude_known(steps: Steps, levels: Levels, attitude: Array) -> tuple[Array, Array]:
+    """How well the attitude is known; arguments as of :func:`smoothed`.
 
-    By the motion, or as well as at the beginning: what the recorded one is off by all flight long
-    is off at every fix, and asking it again and again tells nothing.
+    By the motion, or as well as at the beginning: what the recorded one is off by all flight long,
+    or more and more, is off at every fix, and asking it again and again tells nothing.
+
+    Returns:
+        (3,) on the whole, rad, and (n,) variance of the heading by the motion alone, rad^2.
     """
-    by_motion = smoothed(steps, replace(levels, recorded=NOT_RAD), attitude).sigma[PSI]
-    return np.minimum(by_motion, attitude)
+    by_motion = smoothed(steps, replace(levels, recorded=NOT_RAD), attitude)
+    return np.minimum(by_motion.sigma[PSI], attitude), by_motion.variance[:, HEADING]
 
 
 def _start(attitude: Array) -> Array:

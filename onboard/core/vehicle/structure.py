@@ -25,8 +25,9 @@ from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
-from onboard.core.vehicle.fit import Fit, Slopes, inflation_of, slopes_at, summed
+from onboard.core.vehicle.fit import Fit, Slopes, slopes_at, summed
 from onboard.core.vehicle.gust_errors import rising
+from onboard.core.vehicle.inflation import inflation_of
 from onboard.core.vehicle.limits import FALSE_ALARM, RECEIVER_M_S, SURE
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.places import FORCE
@@ -153,4 +154,7 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     step = Choices(wide).solved([e.name for e in effects]).x
     there = [replace(b, b=b.b - b.times(step)) for b in wide.blocks]
     held = theta + step <= model.least
-    return replace(wide, inflation=inflation_of(there, wide.prior, held))
+    # What errors of the motion look like is asked by itself.
+    none = np.zeros((len(theta), 1))
+    inflation, scale = inflation_of(there, wide.prior, held, none, settled=False)
+    return replace(wide, inflation=inflation, scale=scale)

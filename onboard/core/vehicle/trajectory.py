@@ -7,6 +7,7 @@ So the difference of the two, both averaged alike, is what a smoother
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -56,6 +57,8 @@ class Sensors:
         tilt: (3,) roll and pitch of the body by which the recorded attitude is turned too far, and
             heading to north, rad.
         tilt_sigma: (3,) of that, rad.
+        load_sigma: (3,) what they leave unknown of how the force changes with the load, by the
+            load, body axes.
     """
 
     scale: Array
@@ -68,6 +71,7 @@ class Sensors:
     misread: Misread | None = None
     tilt: Array = field(default_factory=lambda: np.zeros(3))
     tilt_sigma: Array = field(default_factory=UNKNOWN_TILT.copy)
+    load_sigma: Array = field(default_factory=lambda: np.zeros(3))
 
     def attitude(self, R_nb: Array) -> Array:
         """Recorded attitudes (n, 3, 3) without what they are off by all flight long."""
@@ -108,6 +112,9 @@ class Motion:
         attitude_sigma: (3,) of the attitude, about north, east and down, rad.
         fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
             force and recorded attitude, m/s, but for a constant.
+        load_sigma: as that of the sensors.
+        heading_drift: (n,) standard deviation of what the heading is off by more and more, with
+            its sign from where it is known best, rad.
     """
 
     t: Array
@@ -119,6 +126,13 @@ class Motion:
     velocity_sigma: float
     attitude_sigma: Array
     fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
+    load_sigma: Array = field(default_factory=lambda: np.zeros(3))
+    heading_drift: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """No drift where nothing is said of one."""
+        if len(self.heading_drift) != len(self.t):
+            object.__setattr__(self, "heading_drift", np.zeros(len(self.t)))
 
     def finer(self, step_s: float) -> Motion:
         """The same motion at even times, where its samples are usually further apart.
@@ -139,6 +153,7 @@ class Motion:
             R_nb=_at(t, self.t, self.R_nb.reshape(-1, 9)).reshape(-1, 3, 3),
             v_n=_at(t, self.t, self.v_n),
             height=np.interp(t, self.t, self.height),
+            heading_drift=np.interp(t, self.t, self.heading_drift),
         )
 
 
@@ -194,6 +209,7 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     errors = smoothed(steps, levels, start)
     v_n = v_n + _at(t, true_t, errors.x[:, V])
     R = rotation_from_vector(_at(t, true_t, errors.x[:, PSI])) @ R
+    attitude_sigma, heading = attitude_known(steps, levels, start)
     return Motion(
         t,
         f_b,
@@ -202,8 +218,10 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         v_n,
         np.interp(t, true_t, fix_h),
         float(np.max(errors.sigma[V])),
-        attitude_known(steps, levels, start),
+        attitude_sigma,
         (true_t, fix_v - average),
+        sensors.load_sigma,
+        np.interp(t, true_t, _drift(true_t, heading, float(start[2]))),
     )
 
 
@@ -225,6 +243,19 @@ def _steps(at: Array, t: Array, f_n: Array, w_b: Array, R: Array, measured: Arra
         R[nearest],
         measured,
     )
+
+
+def _drift(t: Array, variance: Array, most: float) -> Array:
+    """(n,) rad by which a heading is off more and more, in one standard deviation of that.
+
+    Between turns a bias of the gyroscope turns it, at an even rate: from where it is known best the
+    variance (n,), rad^2, grows.  A compass holds it to ``most``, rad.
+    """
+    since = t - t[np.argmin(variance)]
+    size = math.sqrt(float(np.mean(since**2)))
+    more = math.sqrt(max(float(np.mean(variance) - np.min(variance)), 0.0))
+    out: Array = min(more, most) * since / max(size, 1e-9)
+    return out
 
 
 def _levels(steps: Steps, start: Array) -> Levels:

@@ -19,6 +19,7 @@ from onboard.core.vehicle.limits import (
     SURE,
     UNCLEAR_M_S,
 )
+from onboard.core.vehicle.model import DIFFERENCE
 from onboard.core.vehicle.noise import (
     AxisNoise,
     fitted_noise,
@@ -139,7 +140,28 @@ def _pushed(fit: Fit) -> tuple[float, float, float]:
         sensitivity = model.sensitivity_to(fit.theta, max(gust, RECEIVER_M_S))
     count, evidence = each[:, 2:].sum(axis=0).tolist()
     sigma = math.hypot(gust / math.sqrt(2.0 * count), (gust - grown) / math.sqrt(3.0))
-    return gust, sigma, evidence
+    return gust, math.hypot(sigma, gust * _drag_doubt(fit)), evidence
+
+
+def _drag_doubt(fit: Fit) -> float:
+    """Sigma of the drag that shows a copter's gusts, as a share of it.
+
+    A force that is told to be of so much less drag is of so much more wind.
+    """
+    model = fit.model
+    places = [*model.indices("rotor_drag"), *model.indices("body_drag")]
+    if not places:
+        return 0.0
+    lateral = [k for k, axis in enumerate(model.axes) if axis in (0, 1)]
+    here = rms(model.sensitivity(fit.theta)[:, lateral])
+    slopes = []
+    for k in places:
+        step = fit.theta.copy()
+        step[k] += DIFFERENCE * model.plausible[k]
+        there = rms(model.sensitivity(step)[:, lateral])
+        slopes.append((there - here) / (DIFFERENCE * model.plausible[k]))
+    by, inside = np.array(slopes), fit.covariance[np.ix_(places, places)]
+    return math.sqrt(max(float(by @ inside @ by), 0.0)) / max(here, math.sqrt(TINY))
 
 
 def _sideways(fit: Fit, k: int, sensitivity: Array) -> tuple[float, float, float, float]:

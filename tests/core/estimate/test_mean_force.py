@@ -5,7 +5,7 @@ import pytest
 
 from onboard.answers.recorded import Recorded
 from onboard.core.estimate.comparison import compare
-from onboard.core.estimate.mean_force import in_the_mean, mean_columns
+from onboard.core.estimate.mean_force import in_the_mean, load_sigma, mean_columns
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.effects import BiasStep
 from sitl.builtin.truth import ImuTruth
@@ -69,3 +69,15 @@ def test_columns_of_scale_and_offset_are_the_mean_sample_and_one(flown):
     np.testing.assert_allclose(columns[:, 3:], np.eye(3), atol=1e-12)
     np.testing.assert_allclose(columns[:, :3], np.diag(raw.mean(axis=0)), atol=0.05)
     assert mean_columns(engine, lambda batch, t: t < 0.0) is None
+
+
+def test_how_a_force_changes_with_the_load_is_as_unsure_as_the_scale(flown):
+    """Offsets do not change with it, so that no more than the scale's own sigma is left."""
+    made, _ = flown
+    engine = made.engine(1)
+    scale = engine.model.slices["six"].start + np.arange(3)
+    sigma = np.sqrt(np.diag(engine.solution().covariance))[scale]
+    by_load = load_sigma(engine)
+    # Along z loads are the largest, and nothing else of the model changes with them.
+    assert by_load[2] == pytest.approx(sigma[2], rel=0.5)
+    assert np.all(by_load > 0.0)

@@ -10,13 +10,18 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import ByStep, Unknown
+from onboard.core.vehicle.flight import DRIFT
 
+DRIFTING = "drifting"
+"""Unknown of how many of its sigmas the heading drifts by."""
 LEAST_RAD = 1e-5
 """An attitude that nobody doubts is as good as that: an attitude's step in a log [cost]."""
 
 
 class AttitudeError(ByStep):
-    """A constant rotation about north, east and down, as far from none as is left open.
+    """A rotation about north, east and down, as far from none as is left open.
+
+    It is constant, but that the heading drifts: between turns a bias of the gyroscope turns it.
 
     On a straight flight of a plane a heading that is off by a degree is the wind across of a
     sixtieth of the speed, and a pitch that is off is lift: what tells them apart is turning alone.
@@ -33,13 +38,13 @@ class AttitudeError(ByStep):
         """
         level = float(np.max(force_sigma[:2])) / STANDARD_GRAVITY
         known = np.maximum(np.hypot(sigma, [level, level, 0.0]), LEAST_RAD)
-        super().__init__(
-            [
-                Unknown(f"turned_{axis}", 0.0, float(s), 0.0, "rad")
-                for axis, s in zip(("north", "east", "down"), known, strict=True)
-            ]
-        )
+        turned = [
+            Unknown(f"turned_{axis}", 0.0, float(s), 0.0, "rad")
+            for axis, s in zip(("north", "east", "down"), known, strict=True)
+        ]
+        super().__init__([*turned, Unknown(DRIFTING, 0.0, 1.0, 0.0, "1")])
 
     def act_by(self, air: Air, values: Sequence[Array]) -> None:
         """Turn the air's velocity the other way."""
-        air.turned_n = np.stack(values, axis=1)
+        air.turned_n = np.stack(values[:3], axis=1)
+        air.turned_n[:, 2] += values[3] * air.flight.unsure[:, DRIFT]
