@@ -14,6 +14,7 @@ from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.block_sums import total
 from onboard.core.vehicle.bordered import Bordered
 from onboard.core.vehicle.fit import Fit
+from onboard.core.vehicle.inflation import inflated
 from onboard.core.vehicle.limits import APART, FOLDS, SURE
 
 
@@ -69,9 +70,9 @@ class Choices:
         apart = x - self._nominal
         squares = self._s - 2.0 * self._b @ x + x @ self._N @ x + f.prior @ (apart * apart)
         information = (self._N + np.diag(f.prior))[np.ix_(free, free)]
-        root = np.sqrt(f.inflation[free])
         sigma, covariance = np.zeros(len(x)), np.zeros((len(x),) * 2)
-        inside = np.linalg.inv(information) * np.outer(root, root) + f.untold(information, free)
+        inside = inflated(information, f.prior[free], f.inflation[free])
+        inside += f.untold(information, free)
         covariance[np.ix_(free, free)] = inside
         for i, s in zip(free, np.sqrt(np.diag(inside)).tolist(), strict=True):
             sigma[i] = f.model.unknowns[i].doubted(float(f.theta[i] + x[i]), s)

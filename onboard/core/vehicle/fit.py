@@ -17,7 +17,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
 from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
-from onboard.core.vehicle.inflation import inflation_of
+from onboard.core.vehicle.inflation import inflated, inflation_of
 from onboard.core.vehicle.instruments import whitened_regressors, whitened_residual
 from onboard.core.vehicle.limits import (
     LEAST_SHARE,
@@ -44,7 +44,7 @@ class Fit:
         theta: (m,) unknowns.
         prior: (m,) weights of the prior, 1 / sigma^2.
         blocks: sums about ``theta``.
-        inflation: (m,) by how much variances exceed what whitened rows promise.
+        inflation: (m,) by how much variances by whitened rows exceed what these promise.
         noise: by axis.
         residual: (n, k) measured less predicted, m/s^2.
         jacobian: (n, k) of the prediction.
@@ -79,9 +79,7 @@ class Fit:
     @property
     def covariance(self) -> Array:
         """(m, m), inflated."""
-        root = np.sqrt(self.inflation)
-        out: Array = np.linalg.inv(self.information) * np.outer(root, root)
-        return out
+        return inflated(self.information, self.prior, self.inflation)
 
     @property
     def sigma(self) -> Array:

@@ -28,7 +28,7 @@ def inflation_of(
     *,
     settled: bool = True,
 ) -> tuple[Array, float]:
-    """Variance of the estimate by what is known of its errors, over that of the sums.
+    """Variance of the estimate by what is known of its errors, over that of the rows' share of it.
 
     By blocks it is the cluster-robust (sandwich) estimate (K.-Y. Liang and S. L. Zeger, Biometrika
     73, 1986), with scores as :func:`unfitted` has them.  No unknown has less than the mean of all:
@@ -62,9 +62,25 @@ def inflation_of(
         as_unfitted = unfitted(blocks, scores, inverse)
         out = np.maximum(_by_blocks(as_unfitted, held, inverse, known, told), least)
     out = np.maximum(out, 1.0 + np.sum((inverse @ considered) ** 2, axis=1) / known)
-    # What was known before the flight is as sure as it was.
-    more: Array = 1.0 + (out - 1.0) * known / np.diag(inverse)
-    return more, float(np.median(plain))
+    return out, float(np.median(plain))
+
+
+def inflated(information: Array, prior: Array, inflation: Array) -> Array:
+    """(m, m) covariance of an estimate whose rows are less sure than they promise.
+
+    What was known before the flight is as sure as it was: of ``P = P N P + P L P`` only the first,
+    that of rows ``N``, is inflated.
+
+    Args:
+        information: (m, m) of rows and prior, ``P^-1``.
+        prior: (m,) weights, the diagonal of ``L``.
+        inflation: (m,) as of :func:`inflation_of`.
+    """
+    inverse = np.linalg.inv(information)
+    known = inverse @ (prior[:, None] * inverse)
+    root = np.sqrt(inflation)
+    out: Array = (inverse - known) * np.outer(root, root) + known
+    return out
 
 
 def unfitted(blocks: Sequence[BlockSums], scores: Array, inverse: Array) -> Array:

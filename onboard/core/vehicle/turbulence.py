@@ -48,7 +48,8 @@ class Turbulence:
         whole: RMS by what all gusts, fast ones too, do to the mean of the drag, m/s; None where
             that is not known.
         whole_sigma: of it.
-        by_law: sigma of the gusts by that of the side force that shows them, m/s.
+        by_law: sigma of the gusts by that of the drag or side force that shows them, m/s: of how
+            large they are, and not of whether there are any.
     """
 
     rms: float
@@ -106,8 +107,12 @@ def turbulence_of(fit: Fit) -> Turbulence:
         more, spread = float(fit.theta[k]), float(fit.sigma[k])
         if more > SURE * spread:
             whole = gust * math.exp(more)
-            return Turbulence(gust, sigma, evidence, floor, errors, whole, whole * spread)
-    return Turbulence(gust, sigma, evidence, floor, errors, by_law=gust * _side_doubt(fit))
+            by_law = gust * _drag_doubt(fit)
+            return Turbulence(
+                gust, sigma, evidence, floor, errors, whole, whole * spread, by_law=by_law
+            )
+    doubt = _drag_doubt(fit) if copter else _side_doubt(fit)
+    return Turbulence(gust, sigma, evidence, floor, errors, by_law=gust * doubt)
 
 
 def _side_doubt(fit: Fit) -> float:
@@ -140,7 +145,7 @@ def _pushed(fit: Fit) -> tuple[float, float, float]:
         sensitivity = model.sensitivity_to(fit.theta, max(gust, RECEIVER_M_S))
     count, evidence = each[:, 2:].sum(axis=0).tolist()
     sigma = math.hypot(gust / math.sqrt(2.0 * count), (gust - grown) / math.sqrt(3.0))
-    return gust, math.hypot(sigma, gust * _drag_doubt(fit)), evidence
+    return gust, sigma, evidence
 
 
 def _drag_doubt(fit: Fit) -> float:

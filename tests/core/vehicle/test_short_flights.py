@@ -17,7 +17,7 @@ from onboard.core.vehicle.block_sums import BlockSums
 from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.flight import DRIFT
-from onboard.core.vehicle.inflation import inflation_of, unfitted
+from onboard.core.vehicle.inflation import inflated, inflation_of, unfitted
 from onboard.core.vehicle.motion_errors import errors_of
 from onboard.core.vehicle.plane import plane_model
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
@@ -65,6 +65,17 @@ def test_scatter_of_few_blocks_is_that_of_flight_that_was_not_fitted():
     np.testing.assert_allclose(np.mean(got, axis=0), 1.0, atol=0.15)
     # As they are, a number by one turn would be told from nothing.
     assert np.mean(plain, axis=0)[3] < 0.5
+
+
+def test_what_was_known_before_is_as_sure_as_it_was_and_what_two_know_together_is_not():
+    """Of two unknowns of which the rows know the sum alone."""
+    rows, prior = 1e4 * np.ones((2, 2)), np.array([4.0, 4.0])
+    C = inflated(rows + np.diag(prior), prior, np.full(2, 9.0))
+    of_sum, of_difference = (float(way @ C @ way) for way in np.array([[1.0, 1.0], [1.0, -1.0]]))
+    assert of_sum == pytest.approx(9.0 / 1e4, rel=0.01)
+    assert of_difference == pytest.approx(2.0 / 4.0)
+    plain = np.linalg.inv(rows + np.diag(prior))
+    assert inflated(rows + np.diag(prior), prior, np.ones(2)) == pytest.approx(plain)
 
 
 def test_an_error_of_known_size_adds_what_it_does_to_the_estimate():
