@@ -34,7 +34,7 @@ from onboard.core.diagnosis.jumps import (
 )
 from onboard.core.diagnosis.limits import CLEARLY, SEARCHED
 from onboard.core.diagnosis.nuisance_rivals import compared
-from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.diagnosis.records import Diagnosis, Unused
 from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
@@ -92,12 +92,6 @@ def examine(
     steady = without_shadows(FinalModel(final, families, origin, calibrator.parameters))
     if len(steady) < len(families):
         final, families = only(full, steady, final)
-    asked = not clear.clipped
-    unused = (
-        *unused_flight(flight, calibrator.trust.refusals, clear.fault, origin.t0, asked=asked),
-        *contradicted(final.batches, final.refused_velocities(), clear.fault, origin.t0),
-        *repeated([s for s in calibrator.stuck(imu) if s[1] >= origin.t0], origin.t0),
-    )
     return Judge(
         calibrator,
         imu,
@@ -109,13 +103,38 @@ def examine(
             rivals,
             companions,
             believed(clear.sampled, calibrator.trust.refusals),
-            unused,
+            _unused(calibrator, imu, (clear, flight), final, origin.t0),
             clear.as_sampled,
             clear.clipped,
         ),
         origin,
         clear.absent,
         tuple(e for e in clear.seen if e is not None),
+    )
+
+
+def _unused(
+    calibrator: Calibrator,
+    imu: int,
+    flown: tuple[Cleared, Sequence[Batch]],
+    final: Examination,
+    t0: float,
+) -> tuple[Unused, ...]:
+    """Flight whose fixes, or whose readings of an accelerometer, were not used.
+
+    Args:
+        calibrator: has seen the flight.
+        imu: which accelerometer.
+        flown: the flight without what must not be fitted, and all of it.
+        final: the model that stands.
+        t0: what effects count from, s.
+    """
+    clear, flight = flown
+    refusals, asked = calibrator.trust.refusals, not clear.clipped
+    return (
+        *unused_flight(flight, refusals, clear.fault, t0, asked=asked),
+        *contradicted(final.batches, final.refused_velocities(), clear.fault, t0),
+        *repeated([s for s in calibrator.stuck(imu) if s[1] >= t0], t0),
     )
 
 
