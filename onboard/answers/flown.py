@@ -18,12 +18,10 @@ from onboard.answers.answer import Answer
 from onboard.answers.kept_motion import motion_of
 from onboard.answers.recorded import PAUSE_S, Recorded, later, unanswered
 from onboard.answers.replay import Reading, read
+from onboard.answers.sensors import NO_SENSORS, sensors_of
 from onboard.answers.stands import fixes_of, said_to_stand, with_landings, without_flight
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
-from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.mean_force import load_sigma, mean_force_sigma
-from onboard.core.estimate.misread import attitude_error, misread_of
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S
 from onboard.core.inputs.boot_time import NEXT_S, Boots
@@ -39,31 +37,20 @@ from onboard.core.inputs.samples import (
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array, Mask
-from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.maths.spans import joined
 from onboard.core.vehicle.copter import carried_by_rotors
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.repeats import measured
 from onboard.core.vehicle.same_motion import Disagreement, disagreement
 from onboard.core.vehicle.signals import Signals, Stream
-from onboard.core.vehicle.spans import grounded_spans, joined, lasting_height, scatter_near
+from onboard.core.vehicle.spans import grounded_spans, lasting_height, scatter_near
 from onboard.core.vehicle.touches import touched_spans
-from onboard.core.vehicle.trajectory import UNKNOWN_TILT, Sensors
+from onboard.core.vehicle.trajectory import Sensors
 from onboard.recordings.recording import Recording
 
 FASTEST_HZ: Final = 100.0
 """Inertial samples beyond this rate are averaged: rotors follow a command within hundredths of a
 second and a vehicle more slowly, so that what is faster is vibration [physics]."""
-UNKNOWN_FORCE: Final = 0.05
-"""Sigma of the force on each axis, m/s^2, where the sensor level found nothing: the offset's sigma
-that a calibration has to reach; a sensor without one may be off by ten times that [tuned]."""
-UNKNOWN_LOAD: Final = UNKNOWN_FORCE / STANDARD_GRAVITY
-"""The same of how it changes with the load, by the load: as much at a gravity [physics]."""
-LEAST_FORCE: Final = 0.002
-"""Sigma of the force that no calibration goes below, m/s^2: numbers of 16 bits for 16 g either way
-are in steps of 0.005, which are rounded by 0.0014 RMS [physics]."""
-
-NO_SENSORS: Final = Sensors(np.ones(3), np.zeros(3), np.full(3, LEAST_FORCE))
-"""Of a recording whose force is the slope of its velocity: nothing can be wrong with it alone."""
 
 S = TypeVar("S", Outputs, Battery, AirData)
 
@@ -298,61 +285,6 @@ def flown(
         collected.ground,
         collected.disagreement(derived=derived),
     )
-
-
-def sensors_of(diagnosis: Diagnosis, engine: Engine | None) -> Sensors:
-    """What the sensor level has found, with what it leaves unknown of the force.
-
-    Scale and offset are of a model, which has all that was found in it: what is undone is all of
-    that or, where the flight says nothing, nothing.
-
-    Args:
-        diagnosis: of the flight.
-        engine: whose sums gave it; None where there is none.
-    """
-    c = diagnosis.calibration
-    timing = {name: e.value for name, e in diagnosis.timing.items() if math.isfinite(e.value)}
-    misread, turned = None, None
-    if diagnosis.silent or engine is None:
-        scale, offset = np.array(c.in_force_scale), np.array(c.in_force_offset)
-        sigma = np.full(3, UNKNOWN_FORCE)
-        by_load = np.full(3, UNKNOWN_LOAD)
-    else:
-        scale, offset = np.array(c.scale), np.array(c.offset)
-        sigma, by_load = _force_sigma(engine), _load_sigma(engine)
-        misread, turned = misread_of(engine), attitude_error(engine)
-    tilt, tilt_sigma = turned or (np.zeros(3), UNKNOWN_TILT)
-    return Sensors(
-        scale,
-        offset,
-        sigma,
-        timing.get("gps_delay_s", 0.0),
-        max(timing.get("gps_smoothing_window_s", 0.0), 0.0),
-        timing.get("imu_delay_s", 0.0),
-        np.array([g.value for g in c.gyro_scale]),
-        misread,
-        tilt,
-        tilt_sigma,
-        by_load,
-    )
-
-
-def _force_sigma(engine: Engine) -> Array:
-    """(3,) of the mean force that was measured, m/s^2."""
-    sigma = mean_force_sigma(engine)
-    if sigma is None:
-        return np.full(3, UNKNOWN_FORCE)
-    out: Array = np.where(np.isfinite(sigma), np.maximum(sigma, LEAST_FORCE), UNKNOWN_FORCE)
-    return out
-
-
-def _load_sigma(engine: Engine) -> Array:
-    """(3,) of how the force that was measured changes with the load, by the load."""
-    sigma = load_sigma(engine)
-    if sigma is None:
-        return np.full(3, UNKNOWN_LOAD)
-    out: Array = np.where(np.isfinite(sigma), sigma, UNKNOWN_LOAD)
-    return out
 
 
 def _stream(samples: Sequence[S], values: Callable[[S], tuple[float, ...]]) -> Stream:

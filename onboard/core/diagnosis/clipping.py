@@ -14,6 +14,7 @@ from onboard.core.diagnosis.regimes import spans
 from onboard.core.diagnosis.score import least
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.spans import inside, joined
 from onboard.core.physics.effects.saturation import Saturation
 from onboard.core.physics.finding import Finding, Quantity
 
@@ -62,29 +63,15 @@ def _often(batches: Sequence[Batch], t0: float, counted: _Counted) -> Finding | 
     """Clipping that the autopilot has counted; a low-pass hides the rail from the samples."""
     if np.count_nonzero(counted.rise >= FEWEST_CLIPPED) < 2:
         return None
-    joined = _joined(counted.spans, 1e-3)
+    found = joined(((a, b) for a, b in counted.spans.tolist()), 1e-3)
     raw = np.concatenate([c.segment.raw_s for c in batches])
-    times = np.concatenate([c.segment.t for c in batches])
-    inside = np.zeros(len(times), dtype=bool)
-    for begin, end in joined:
-        inside |= (times >= begin) & (times <= end)
-    if not inside.any():
+    clipped = inside(np.concatenate([c.segment.t for c in batches]), found)
+    if not clipped.any():
         return None
-    tops = np.percentile(np.abs(raw[inside]), 99.9, axis=0)
+    tops = np.percentile(np.abs(raw[clipped]), 99.9, axis=0)
     worst = int(np.argmax(tops))
     top = float(tops[worst])
-    return _saturation(batches, t0, top, 0.03 * top, worst, joined, float(inside.mean()))
-
-
-def _joined(spans: Array, apart: float) -> list[tuple[float, float]]:
-    """Spans (k, 2), s, in order; those that are no further ``apart``, s, are one."""
-    out: list[tuple[float, float]] = []
-    for begin, end in spans[np.argsort(spans[:, 0])].tolist():
-        if out and begin - out[-1][1] <= apart:
-            out[-1] = out[-1][0], max(end, out[-1][1])
-        else:
-            out.append((begin, end))
-    return out
+    return _saturation(batches, t0, top, 0.03 * top, worst, found, float(clipped.mean()))
 
 
 def _stuck(batches: Sequence[Batch], t0: float, counted: Array) -> Finding | None:
@@ -114,7 +101,8 @@ def _stuck(batches: Sequence[Batch], t0: float, counted: Array) -> Finding | Non
         return None
     t = np.concatenate([c.segment.t for c in batches])
     where = t[best[2]]
-    found = _joined(np.concatenate([np.stack([where, where], axis=-1), counted]), TOGETHER_S)
+    at_all = np.concatenate([np.stack([where, where], axis=-1), counted])
+    found = joined(((a, b) for a, b in at_all.tolist()), TOGETHER_S)
     return _saturation(batches, t0, abs(best[1]), 0.01, best[3], found, best[0] / len(t))
 
 

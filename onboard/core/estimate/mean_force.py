@@ -7,7 +7,7 @@ with all of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.accelerometer import linear_of, parameters_jacobian
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.model.quadrature import NodeMaker
+from onboard.core.model.regressors import Model
 
 SIX = "six"
 LEAST_LOAD = 0.01
@@ -38,13 +39,9 @@ def mean_columns(engine: Engine, chosen: Chosen | None = None) -> Array | None:
     Returns:
         m/s^2 per unit; None if there are no samples.
     """
-    model = engine.model
-    columns, count = np.zeros((3, model.size)), 0
-    before: Segment | None = None
-    for batch in engine.batches:
-        known = {} if batch.fresh or before is None else before.slow
-        segment = before = model.remembering(batch.segment, known)
-        t = segment.t[(segment.t >= batch.fixes.t[0]) & (segment.t < batch.fixes.t[-1])]
+    columns, count = np.zeros((3, engine.model.size)), 0
+    for batch, segment, mine in _flown(engine):
+        t = segment.t[mine]
         if chosen is not None:
             t = t[chosen(batch, t)]
         if len(t):
@@ -66,9 +63,7 @@ def mean_force_sigma(engine: Engine) -> Array | None:
     model, solution, columns = engine.model, engine.solution(), mean_columns(engine)
     if solution is None or columns is None:
         return None
-    for family in model.families:
-        if not family.is_read:
-            columns[:, model.slices[family.name]] = 0.0
+    columns[:, ~_read(model)] = 0.0
     six, R_bs = solution.theta[model.slices[SIX]], engine.batches[0].segment.R_bs
     raw = np.diag(columns[:, model.slices[SIX]])
     floor = (SCALE_FLOOR * raw) ** 2 + (OFFSET_FLOOR * six[:3]) ** 2
@@ -89,17 +84,8 @@ def load_sigma(engine: Engine) -> Array | None:
     model, solution = engine.model, engine.solution()
     if solution is None:
         return None
-    C = solution.covariance.copy()
-    for family in model.families:
-        if not family.is_read:
-            its = model.slices[family.name]
-            C[its] = C[:, its] = 0.0
     added, felt = [], []
-    before: Segment | None = None
-    for batch in engine.batches:
-        known = {} if batch.fresh or before is None else before.slow
-        segment = before = model.remembering(batch.segment, known)
-        mine = (segment.t >= batch.fixes.t[0]) & (segment.t < batch.fixes.t[-1])
+    for _, segment, mine in _flown(engine):
         if not mine.any():
             continue
         # Loads change over seconds, and what shakes is not asked for.
@@ -114,7 +100,10 @@ def load_sigma(engine: Engine) -> Array | None:
         return None
     A, felt_b = np.concatenate(added), np.concatenate(felt)
     A, felt_b = A - A.mean(axis=0), felt_b - felt_b.mean(axis=0)
-    variance = np.mean(np.einsum("nij,jk,nik->ni", A, C, A, optimize=True), axis=0)
+    A[..., ~_read(model)] = 0.0
+    variance = np.mean(
+        np.einsum("nij,jk,nik->ni", A, solution.covariance, A, optimize=True), axis=0
+    )
     out: Array = np.sqrt(variance / np.maximum(np.mean(felt_b**2, axis=0), LEAST_LOAD**2))
     return out
 
@@ -146,6 +135,23 @@ def in_the_mean(made: Calibration, engine: Engine) -> Calibration:
     # What its sigmas have beyond the sums (floors, axes, what is open) stays as it is.
     J = parameters_jacobian(solution.theta)
     return with_six(made, linear, covariance, np.array(made.covariance) - J @ plain @ J.T)
+
+
+def _flown(engine: Engine) -> Iterator[tuple[Batch, Segment, Mask]]:
+    """Batches, their samples with what effects remember, and which of them are between fixes."""
+    before: Segment | None = None
+    for batch in engine.batches:
+        known = {} if batch.fresh or before is None else before.slow
+        segment = before = engine.model.remembering(batch.segment, known)
+        yield batch, segment, (segment.t >= batch.fixes.t[0]) & (segment.t < batch.fixes.t[-1])
+
+
+def _read(model: Model) -> Mask:
+    """(m,) which unknowns are of what the accelerometer reads."""
+    out: Mask = np.zeros(model.size, dtype=np.bool_)
+    for family in model.families:
+        out[model.slices[family.name]] = family.is_read
+    return out
 
 
 def _added(engine: Engine, segment: Segment, t: Array) -> Array:

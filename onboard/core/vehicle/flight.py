@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.maths.spans import inside
 from onboard.core.vehicle.atmosphere import density
 from onboard.core.vehicle.limits import BLOCK_S, CONTACT_M_S2, FEWEST_BLOCKS, STEP_S
 from onboard.core.vehicle.signals import COVERED, Signals, Stream
-from onboard.core.vehicle.spans import inside
 from onboard.core.vehicle.trajectory import Motion
 
 _BY_STEP = (

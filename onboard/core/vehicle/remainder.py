@@ -15,6 +15,7 @@ import numpy as np
 from onboard.core.inputs.limits import GROUND_M, STILL_M_S
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.chi_square import survival
+from onboard.core.maths.spans import following, joined
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.limits import (
@@ -26,7 +27,6 @@ from onboard.core.vehicle.limits import (
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.noise import rms, whitened
 from onboard.core.vehicle.places import AXES
-from onboard.core.vehicle.spans import following, joined
 from onboard.core.vehicle.windows import windows_of
 
 FORCES = (0, 1, 2)

@@ -12,8 +12,8 @@ import numpy as np
 
 from onboard.core.inputs.limits import GROUND_M, STILL_M_S
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.spans import joined
 from onboard.core.vehicle.limits import APART_FORCE_M_S2, MARGIN_S, OUTLYING, STILL_S
-from onboard.core.vehicle.spans import joined
 
 
 def touched_spans(

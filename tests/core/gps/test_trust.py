@@ -2,14 +2,13 @@
 
 import math
 import random
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onboard.core.gps.distrust import Distrust, WindowClosed, WindowOpened
-from onboard.core.gps.limits import GIVEN_UP_S, RECOVERY, TrustLimits
+from onboard.core.gps.limits import RECOVERY, TrustLimits
 from onboard.core.gps.trust import Phase, TrustWindow
 from onboard.core.inputs.samples import (
     AttitudeSample,
@@ -19,41 +18,9 @@ from onboard.core.inputs.samples import (
     ImuSample,
     VehicleState,
 )
+from tests.core.gps.fixes import STEP, fix, fly, opened
 
 HEALTHY = 0b11_0011_1111  # all but terrain, not constant position
-STEP = 0.2
-
-
-def fix(t, **changes):
-    """A receiver that flies north at 10 m/s from 47 N 8 E, five times a second."""
-    good = GpsFix(
-        t=t,
-        receiver=1,
-        fix_type=3,
-        latitude=0.82 + 10 * t / 6.371e6,
-        longitude=0.14,
-        altitude=400.0,
-        v_n=10.0,
-        v_e=0.0,
-        satellites=11,
-        hdop=0.9,
-    )
-    return replace(good, **changes)
-
-
-def fly(window, start, end, **changes):
-    """Feed fixes every STEP from start up to and including end; all events."""
-    events = []
-    for k in range(round((end - start) / STEP) + 1):
-        events += window.feed(fix(start + k * STEP, **changes))
-    return events
-
-
-def opened(window, events):
-    """Time of the only opening in ``events``, which must be of an open window."""
-    assert window.is_open
-    (event,) = [e for e in events if isinstance(e, WindowOpened)]
-    return event.t
 
 
 def test_waits_then_opens_on_the_first_good_fix_and_counts_trusted_time():
@@ -300,62 +267,6 @@ def test_finish_closes_at_the_last_fix_once():
     assert window.finish() == ()
     assert window.feed(fix(4.0)) == ()
     assert TrustWindow().finish() == ()
-
-
-def test_only_one_receiver_is_watched():
-    window = TrustWindow(receiver=2)
-    assert fly(window, 0.0, 1.0) == []
-    assert fly(window, 1.2, 2.0, receiver=2) == [WindowOpened(1.2)]
-    first = TrustWindow()
-    fly(first, 0.0, 1.0)
-    assert first.feed(fix(1.1, receiver=2, fix_type=0)) == ()
-    assert first.receiver == 1
-
-
-def both(window, start, end, *, first, second):
-    """Two receivers side by side; ``first`` and ``second`` are changes, None: silent."""
-    events = []
-    for k in range(round((end - start) / STEP) + 1):
-        t = start + k * STEP
-        for number, changes in ((1, first), (2, second)):
-            if changes is not None:
-                events += window.feed(fix(t, receiver=number, **changes))
-        events += window.feed(ImuSample(t, 1, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0)))
-    return events
-
-
-@pytest.mark.parametrize("after", [{"fix_type": 0}, None])
-def test_a_receiver_that_has_never_had_a_fix_is_given_up_for_one_that_has(after):
-    window = TrustWindow()
-    window.feed(fix(0.0, fix_type=0))
-    assert both(window, 0.2, GIVEN_UP_S - 1.0, first=after, second={}) == []
-    assert window.receiver == 1
-    events = both(window, GIVEN_UP_S - 0.8, GIVEN_UP_S + 5.0, first=after, second={})
-    assert window.receiver == 2
-    assert opened(window, events) == pytest.approx(GIVEN_UP_S, abs=1.0)
-
-
-@pytest.mark.parametrize("named", [None, 1])
-def test_a_receiver_that_was_trusted_is_not_exchanged_before_the_next_flight(named):
-    window = TrustWindow(receiver=named)
-    both(window, 0.0, 5.0, first={}, second={})
-    both(window, 5.2, 5.0 + 2 * GIVEN_UP_S, first={"fix_type": 0}, second={})
-    assert window.receiver == 1
-    assert not window.is_open
-    window.restart(5.0 + 2 * GIVEN_UP_S)
-    both(window, 1.0, 2 * GIVEN_UP_S, first=None, second={})
-    assert window.receiver == 1, "sums may go on over a boot"
-    window.begin_flight()
-    both(window, 2 * GIVEN_UP_S + 1.0, 4 * GIVEN_UP_S, first=None, second={})
-    assert (window.receiver, window.is_open) == ((2, True) if named is None else (1, False))
-
-
-def test_a_slow_start_is_waited_for():
-    window = TrustWindow()
-    both(window, 0.0, GIVEN_UP_S - 5.0, first={"fix_type": 0}, second={})
-    both(window, GIVEN_UP_S - 4.8, 2 * GIVEN_UP_S, first={}, second={})
-    assert window.receiver == 1
-    assert window.is_open
 
 
 number = st.one_of(st.floats(), st.floats(-20, 20))

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onboard.core.maths.spans import following, inside, joined
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.copter import copter_model
 from onboard.core.vehicle.fit import fitted
 from onboard.core.vehicle.remainder import not_used, remainder_sentence, share_of
 from onboard.core.vehicle.signals import Stream
-from onboard.core.vehicle.spans import following, inside, joined
 from onboard.core.vehicle.touches import touched_spans
 from tests.core.vehicle.flights import copter_flight
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from onboard.core.maths.frames import rotation_from_vector
+from onboard.core.maths.spans import inside
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.airframe import CopterAirframe
 from onboard.core.vehicle.atmosphere import density
@@ -18,7 +19,7 @@ from onboard.core.vehicle.noise import AxisNoise, fitted_noise, whitened
 from onboard.core.vehicle.recursion import Remembered, accumulated, ahead, behind, lagged
 from onboard.core.vehicle.signals import Signals, Stream
 from onboard.core.vehicle.smoother import PSI, Levels, Steps, smoothed
-from onboard.core.vehicle.spans import grounded_spans, inside, lasting_height
+from onboard.core.vehicle.spans import grounded_spans, lasting_height
 from tests.core.vehicle.flights import copter_flight
 
 
