@@ -14,6 +14,8 @@ JOURNAL_LINES = 2
 ROOMY = 2
 """Of more accelerometers the numbers come before the journal."""
 ROWS = 4
+WARNINGS = 2
+"""What is wrong on the wire takes no more lines than that: the page has all of it."""
 IMU_LINES = 4
 """Of an accelerometer, besides the rows of its table."""
 
@@ -23,6 +25,7 @@ def compact(snapshot: Snapshot, height: int) -> RenderableType:
     top = [_vehicle(snapshot), gps(snapshot)]
     if snapshot.mode != "active":
         top.append(Text(f"{snapshot.mode}: {snapshot.mode_reason}", style="yellow"))
+    top += [Text(f"warning: {said}", style="yellow") for said in snapshot.link.warnings[:WARNINGS]]
     bottom = [_push(snapshot)]
     if len(snapshot.imus) <= ROOMY:
         bottom += [when(line.at, line.text) for line in snapshot.journal[-JOURNAL_LINES:]]

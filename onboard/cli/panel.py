@@ -104,6 +104,8 @@ def _head(snapshot: Snapshot) -> Table:
     ]
     table.add_row("messages", ", ".join(rates) or "none yet")
     table.add_row("GPS", gps(snapshot)[4:])
+    for sentence in link.warnings:
+        table.add_row("warning", Text(sentence, style="yellow"))
     return table
 
 

@@ -161,6 +161,15 @@ class Link:
         if self.autopilot is not None:
             participant.start(self.autopilot.system, self.autopilot.component, self._clock())
 
+    @property
+    def recorded(self) -> bool:
+        """Whether somebody records it."""
+        return self._recorder is not None
+
+    def record(self, recorder: Recorder) -> None:
+        """Have it recorded from here on; the recorder is run by who has made it."""
+        self._recorder = recorder
+
     # Life
 
     async def run(self) -> None:

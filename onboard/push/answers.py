@@ -25,6 +25,14 @@ WHY_NOT_SET = {
     Failure.CHANGED_BY_OTHER: Reason.CHANGED_BY_OTHER,
 }
 """Reasons of a write that failed; any other failure is a denial."""
+IN_WORDS = {
+    Failure.SILENT: "the autopilot does not answer",
+    Failure.DOES_NOT_EXIST: "the autopilot has no such parameter",
+    Failure.DENIED: "the autopilot refuses it",
+    Failure.NOT_TAKEN: "the autopilot keeps its old value",
+    Failure.CHANGED_BY_OTHER: "somebody else set it meanwhile",
+}
+"""The end of a sentence on each, for people."""
 
 
 class Answers:
@@ -81,7 +89,7 @@ class Answers:
             self.hear(course.trouble(Reason.CHANGED_BY_OTHER, sentence, now), now)
 
     def _read_failed(self, name: str, failure: Failure, now: float) -> None:
-        course, sentence = self._course, f"{name} cannot be read: {failure.value}"
+        course, sentence = self._course, f"{name} cannot be read: {IN_WORDS[failure]}"
         turn = course.trouble if course.forward else course.stuck
         self.hear(turn(Reason.SILENT, sentence, now), now)
 
@@ -100,7 +108,7 @@ class Answers:
     def _set_failed(self, name: str, failure: Failure, value: float | None, now: float) -> None:
         course, progress = self._course, self._course.progress
         reason = WHY_NOT_SET.get(failure, Reason.DENIED)
-        sentence = f"{name} was not written: {failure.value}"
+        sentence = f"{name} was not written: {IN_WORDS[failure]}"
         if reason is Reason.CHANGED_BY_OTHER:
             sentence = f"somebody else set {name} in the middle"
         if course.state is State.WRITING:

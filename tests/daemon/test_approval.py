@@ -6,7 +6,15 @@ import aiohttp
 import pytest
 
 from onboard.errors import RefusedError
-from tests.daemon.daemons import WANTED, convinced, held_back, in_force, pushed, until
+from tests.daemon.daemons import (
+    WANTED,
+    convinced,
+    held_back,
+    in_force,
+    notices,
+    pushed,
+    until,
+)
 from tests.daemon.standing_vehicle import Vehicle
 
 pytestmark = pytest.mark.virtual_time
@@ -86,6 +94,26 @@ async def test_an_approval_lapses_when_the_estimate_moves(document, daemon, port
         convinced(service, dataclasses.replace(WANTED, offset=(0.3, -0.1, 0.15)))
         await until(lambda: "approval" in held_back(service))
         assert vehicle.sets == []
+
+
+async def test_nobody_is_asked_again_for_what_is_being_written(document, daemon, port):
+    document["push"]["approval"] = True
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        vehicle.denied.add("INS_ACCOFFS_Y")
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.approval_needed)
+        await service.approve(())
+        await until(lambda: "rolled back" in (service.snapshot().push.last_outcome or ""))
+        assert service.snapshot().push.last_outcome.endswith("the autopilot keeps its old value")
+        assert in_force(vehicle) == pytest.approx(before)
+        # It is still approved, and is tried again by itself.
+        await until(lambda: "failed_before" in held_back(service))
+        assert "approval" not in held_back(service)
+        vehicle.denied.clear()
+        await until(lambda: pushed(vehicle))
+        assert len(notices(service, "approval_needed")) == 1
+        assert "approvals_lapsed" not in service.snapshot().counters
 
 
 async def test_a_rejected_push_stays_rejected_until_approved(document, daemon, port):

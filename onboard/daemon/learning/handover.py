@@ -1,20 +1,28 @@
-"""Between the loop and the learner's thread: batches go over, what was learned comes back."""
+"""Between the loop and the learner's thread: batches go over, what was learned comes back.
+
+**A learner that fails** (a mistake of ours: it never raises on data that is merely bad) takes
+nobody along.  Link, parameters, page and a push under way go on; another learner takes its place
+and begins as after a restart of the service, from what is on the disk.  Where several fail before
+one flight was judged, the last one is *resting*: it is told who is there and which parameters are
+in force, so that everything written can still be audited, approved and rolled back, but no flight.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import ParamSpec, Protocol, TypeVar
 
-from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
 from onboard.daemon.learning import limits
+from onboard.daemon.learning.failures import Failures, LearnerError
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learned, Learner
 from onboard.daemon.learning.worker import Worker
 from onboard.daemon.view.notices import Notices
-from onboard.errors import StateError
+from onboard.errors import OnboardError, StateError
 from onboard.mavlink.decode import Decoder
 from onboard.mavlink.dialect import Message
 from onboard.mavlink.limits import PARAMETERS_MAX
@@ -23,6 +31,8 @@ from onboard.outage import Outage
 
 P = ParamSpec("P")
 T = TypeVar("T")
+RESTING = (ParameterValue, VehicleState)
+"""What a learner is told that learns no flight."""
 logger = logging.getLogger(__name__)
 
 
@@ -38,6 +48,10 @@ class There(Protocol):
         """Whether it has said who it is, and the parameters that say what its messages mean."""
 
     @property
+    def parameters(self) -> Mapping[str, float]:
+        """All that it has told of them, by name."""
+
+    @property
     def judging(self) -> frozenset[str]:
         """Pushes that wait for the flight that judges them, by transaction."""
 
@@ -51,6 +65,7 @@ class Handover:
 
     Args:
         learner: whom to hand the batches.
+        successor: makes another one when it has failed; None: its failure ends :meth:`run`.
         notices: where its news go.
         there: who is there, and what is to be done with what it teaches.
         clock: monotonic time, s.
@@ -69,15 +84,18 @@ class Handover:
         wall_clock: Callable[[], float],
         save_every_s: float,
         needed: frozenset[str] = frozenset(),
+        successor: Callable[[], Learner] | None = None,
     ) -> None:
         self.decoder = Decoder()
         self.repetitions = Repetitions()
         self.learned: Learned | None = None
         self.counters: Counter[str] = Counter()
+        self.failures = Failures()
         self._learner = learner
+        self._successor = successor
         self._notices = notices
         self._there = there
-        self._begun = self._taught = False
+        self._begun = self._taught = self._succeeded = False
         self._clock = clock
         self._wall_clock = wall_clock
         self._save_every_s = save_every_s
@@ -169,8 +187,26 @@ class Handover:
         """Learn until cancelled."""
         self._worker = Worker("learner")
         while True:
-            await self.step()
+            try:
+                await self.step()
+            except LearnerError as failure:
+                self._replace(failure)
             await asyncio.sleep(limits.BATCH_S)
+
+    def _replace(self, failure: LearnerError) -> None:
+        """Another learner takes the place of one that has failed, or there is none left.
+
+        Raises:
+            LearnerError: one has failed that learns no flight any more.
+        """
+        if self._successor is None or self.failures.stopped:
+            raise failure
+        self.counters["learner_failed"] += 1
+        logger.error("the estimator has failed", exc_info=failure.__cause__)
+        self._notices.post(*self.failures.take(failure), warning=True)
+        self._learner, self._succeeded = self._successor(), True
+        self._begun = self._taught = False
+        self._arrived = self._taken = self._busy_since = self._before_gap = None
 
     async def step(self) -> None:
         """One batch, one diagnosis if one is due, and the sums to disk when that is due."""
@@ -208,6 +244,9 @@ class Handover:
         # The parameters before all else; a stable order: the latest report still comes last.
         self._samples.sort(key=lambda sample: type(sample) is not ParameterValue)
         told = [s for s in self._samples if type(s) is ParameterValue]
+        if self._succeeded:  # whoever came after the first one has missed what was told before
+            known = self._there.parameters
+            told = [*(ParameterValue(name, value) for name, value in known.items()), *told]
         gaps = self.counters["gaps"]
         await self._call(self._learner.identify, identity, told)
         self._begun = gaps == self.counters["gaps"]  # no other one while that was done
@@ -225,6 +264,8 @@ class Handover:
 
     def _next_batch(self) -> list[Sample]:
         samples, self._samples = self._samples, []
+        if self.failures.stopped:
+            samples = [s for s in samples if type(s) in RESTING]
         self._taken, self._arrived = self._arrived, None
         return samples
 
@@ -284,6 +325,8 @@ class Handover:
                     await self._worker.close()
         except TimeoutError:
             logger.warning("the learner is busy: the next start goes on from the last save")
+        except LearnerError:
+            logger.exception("the estimator has failed: the next start goes on from the last save")
 
     def let_go(self) -> None:
         """Stop at once; the thread ends when it can, or with the process."""
@@ -292,6 +335,7 @@ class Handover:
 
     def _accept(self, learned: Learned) -> None:
         self.learned = learned
+        self.failures.judged(learned)
         # Until it has learned a batch of who is there, what is known is of who was there before.
         self._taught = self._begun
         for news in learned.news:
@@ -300,7 +344,17 @@ class Handover:
             listener(learned)
 
     async def _call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """On the learner's thread, or here while there is none."""
-        if self._worker is None:
-            return function(*args, **kwargs)
-        return await self._worker.call(function, *args, **kwargs)
+        """On the learner's thread, or here while there is none.
+
+        Raises:
+            OnboardError: an answer that is none that was hoped for.
+            LearnerError: a mistake of ours.
+        """
+        try:
+            if self._worker is None:
+                return function(*args, **kwargs)
+            return await self._worker.call(function, *args, **kwargs)
+        except (OnboardError, MemoryError):  # memory comes back with another process
+            raise
+        except Exception as error:
+            raise LearnerError("the estimator has failed") from error

@@ -1,7 +1,7 @@
 """Every number of this room that decides something: its unit, and where it comes from.
 
-Provenance in brackets: *data* (rates of what comes in), *cost* (what a companion has to spare), or
-*tuned*.
+Provenance in brackets: *data* (rates of what comes in), *cost* (what a companion has to spare),
+*use* (what people have of it), or *tuned*.
 """
 
 from __future__ import annotations
@@ -25,6 +25,10 @@ CAUGHT_UP_S: Final = 2.0
 STEP_LIMIT_S: Final = 120.0
 """s; a refinement or a diagnosis takes seconds, on a slow companion a minute, longer is a hang
 [cost]."""
+
+FAILURES_MAX: Final = 3
+"""Learners that may fail before one flight was judged in full: one by chance, one that the flight
+makes fail again, and then nothing else is to be expected of it [use]."""
 
 FILTER_SILENT_S: Final = 5.0
 """s of an open window without a report of the autopilot's filter: it sends none.  Two a second are

@@ -1,7 +1,7 @@
 """Every number of this room that decides something: its unit, and where it comes from.
 
-Provenance in brackets: *service* (systemd/onboard.service), *data* (rates of what comes in), or
-*tuned*.
+Provenance in brackets: *cost* (what a companion has to spare), *service*
+(systemd/onboard.service), *data* (rates of what comes in), or *tuned*.
 """
 
 from __future__ import annotations
@@ -19,6 +19,10 @@ STALL_S: Final = 0.05
 """s; a turn of the loop that takes longer is counted: half the link's tick [tuned]."""
 STALL_TOLD_S: Final = 60.0
 """s between two lines in the log about that [tuned]."""
+FAILURE_FILES: Final = 2
+FAILURE_FILE_BYTES: Final = 50_000_000
+"""What is kept of the link after a failure of the estimator: at 50 kB/s two times a quarter of an
+hour, which is a flight [cost: 100 MB of the disk]."""
 STALE_S: Final = 5.0
 """s; a flag not repeated for so long says nothing about now [data: five HEARTBEATs]."""
 CONTRADICTION_S: Final = 1.2

@@ -113,6 +113,7 @@ class Parts:
                 signing,
                 handover.repetitions,
                 Hindrance(link, parameters, traffic, has_key=signing is not None),
+                handover.failures,
                 notices,
             ),
         )
@@ -160,18 +161,19 @@ def _handover(
     clock: Callable[[], float],
     wall_clock: Callable[[], float],
 ) -> Handover:
-    learner = Learner(
-        Store(configuration.state.path()),
-        settings.estimator_settings(configuration.estimator),
-        clock=clock,
-        wall_clock=wall_clock,
-    )
+    store = Store(configuration.state.path())
+    estimator = settings.estimator_settings(configuration.estimator)
+
+    def learner() -> Learner:
+        return Learner(store, estimator, clock=clock, wall_clock=wall_clock)
+
     return Handover(
-        learner,
+        learner(),
         notices,
         there=there,
         clock=clock,
         wall_clock=wall_clock,
         save_every_s=configuration.estimator.save_every_s,
         needed=NEEDED,
+        successor=learner,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from onboard import __version__
@@ -17,7 +17,7 @@ from onboard.daemon.view.journal_lines import journal_view
 from onboard.daemon.view.link_health import link_view
 from onboard.daemon.view.numbers import finite_values
 from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
-from onboard.daemon.view.state import INFO, WARNING, Circumstances, next_step
+from onboard.daemon.view.state import ERROR, INFO, WARNING, Circumstances, next_step
 from onboard.daemon.view.trust import NO_TRUST
 from onboard.push.policy import VehicleCondition
 
@@ -60,7 +60,7 @@ class Portrait:
             notices=self.parts.notices.kept,
             counters=self._counters(),
             diagnosis=self.parts.diagnoses.document,
-            next_step=next_step(imus) if imus else self._first_step(now),
+            next_step=self._next_step(now, imus),
         )
 
     def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
@@ -82,6 +82,11 @@ class Portrait:
             for imu, calibration in (learned.calibrations.items() if learned else ())
         )
 
+    def _next_step(self, now: float, imus: Sequence[ImuView]) -> StepView | None:
+        if self.parts.vigilance.stopped:
+            return StepView(imu=None, text=self.parts.vigilance.stopped, severity=ERROR)
+        return next_step(imus) if imus else self._first_step(now)
+
     def _first_step(self, now: float) -> StepView | None:
         """What to do while no accelerometer has an answer; None: nothing is known of a vehicle."""
         if hindered := self.parts.vigilance.hindered(now):
@@ -94,6 +99,8 @@ class Portrait:
         """One line for systemctl status."""
         if self.parts.link.autopilot is None:
             return "waiting for an autopilot's heartbeat"
+        if self.parts.vigilance.stopped:
+            return self.parts.vigilance.stopped
         learned = self.parts.handover.learned
         if learned is None:
             return f"{self.parts.link.state.value}, nothing learned yet"

@@ -22,6 +22,7 @@ from onboard.daemon.outlets.door import Door
 from onboard.daemon.outlets.outlets import Outlets
 from onboard.daemon.process import limits
 from onboard.daemon.process.contact import Contact, Life
+from onboard.daemon.process.failure_recording import FailureRecording
 from onboard.daemon.process.interrupts import stop_signals
 from onboard.daemon.process.notify import Notifier
 from onboard.daemon.process.parts import Parts
@@ -76,6 +77,10 @@ class Service:
         self._stalls_told, self._tell_stalls_at = 0, 0.0
         self._portrait = Portrait(self.parts, self._outlets, self._life, self._turns, wall_clock)
         self._notifier = Notifier.from_environment()
+        self._kept_aside = FailureRecording(
+            self.link, configuration.state.path() / "after-failure", wall_clock
+        )
+        self.handover.failures.heard = self._kept_aside.begin
         self._pages = tuple(pages)
         self._clock = clock
         self._started = clock()
@@ -228,6 +233,7 @@ class Service:
         """Whatever way it ended: no port, file or lock stays behind."""
         self._life.phase = "stopped"
         self.link.close()
+        await self._kept_aside.close()
         if self.server is not None:
             await self.server.close()
         self.parts.journal.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from onboard.daemon.learning.identity import Identity
@@ -20,7 +21,7 @@ class Situation:
 
     link: Link
     board: Board
-    parameters: ParameterWatch
+    watch: ParameterWatch
     witness: Witness
     proposals: Proposals
 
@@ -35,8 +36,13 @@ class Situation:
     @property
     def introduced(self) -> bool:
         """Whether it has said which board it is and what its messages mean."""
-        told = self.parameters.complete or not self.parameters.enabled
+        told = self.watch.complete or not self.watch.enabled
         return told and self.board.answered
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """All that it has told of them, by name."""
+        return self.watch.values
 
     @property
     def judging(self) -> frozenset[str]:

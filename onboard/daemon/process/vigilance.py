@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from onboard.daemon.learning.failures import Failures
 from onboard.daemon.process import limits
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
@@ -18,6 +19,9 @@ UNSIGNED = (
 )
 
 
+STOPPED = "learner_stopped"
+
+
 class Vigilance:
     """Looks at the link and at what it brings; ``now`` is a monotonic clock, s.
 
@@ -27,6 +31,7 @@ class Vigilance:
         signing: the key's bookkeeping, None without a key.
         repetitions: samples with one time stamp and different content.
         hindrance: what keeps us from learning or writing.
+        failures: of the learner.
         notices: where it is told.
     """
 
@@ -37,6 +42,7 @@ class Vigilance:
         signing: Signing | None,
         repetitions: Repetitions,
         hindrance: Hindrance,
+        failures: Failures,
         notices: Notices,
     ) -> None:
         self._link = link
@@ -44,6 +50,7 @@ class Vigilance:
         self._signing = signing
         self._repetitions = repetitions
         self._hindrance = hindrance
+        self._failures = failures
         self._notices = notices
         self._told: set[str] = set()
 
@@ -52,13 +59,18 @@ class Vigilance:
         self._hindrance.look(now)
         found = dict(self._found(now))
         for kind, text in found.items():
-            if kind not in self._told:
+            if kind not in self._told and kind != STOPPED:  # which was said, with its cause
                 self._notices.post(kind, text, warning=True)
         self._told = set(found)
 
     def warnings(self, now: float) -> tuple[str, ...]:
         """What is so now, one sentence each."""
         return tuple(text for _, text in self._found(now))
+
+    @property
+    def stopped(self) -> str:
+        """Why no flight is learned until the service is restarted, in a sentence; else empty."""
+        return self._failures.stopped
 
     def hindered(self, now: float) -> str:
         """What keeps anything from being learned or written now, in a sentence; else empty."""
@@ -75,6 +87,8 @@ class Vigilance:
     def _found(self, now: float) -> Iterator[tuple[str, str]]:
         if self._signing is None and (open_ones := self._open_to_a_network()):
             yield "unsigned_network", f"{open_ones}: {UNSIGNED}"
+        if self.stopped:
+            yield STOPPED, self.stopped
         yield from self._hindered(now)
         rivals = self._link.presence.rivals(now)
         if rivals:

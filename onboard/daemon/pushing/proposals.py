@@ -166,10 +166,12 @@ class Proposals:
     def _to_write(self, known: PushPlan, calibration: Calibration) -> PushPlan:
         """What a person approved, as long as that is for what is there and known; else ``known``.
 
-        It is judged as it would be written: what is known has moved a little since.
+        It is judged as it would be written: what is known has moved a little since.  Values that
+        change because they are being written are no reason to ask anew: it may have to be repeated.
         """
         standing = self.standing(known.imu)
-        if standing.approved is not None and _lapsed(standing.approved, known):
+        ours = known.imu == self.writing
+        if standing.approved is not None and not ours and _lapsed(standing.approved, known):
             standing.approved = standing.despite = None
             self.counters["approvals_lapsed"] += 1
         if standing.approved is None:

@@ -38,7 +38,8 @@ def push_view(
         lost: accelerometers whose values the autopilot had not stored: to be put back.
         mixed: accelerometers that have old and new values, nobody knows why.
     """
-    waiting = (p.held_back.keys() for p in proposals.current.values() if p.held_back)
+    current = proposals.current.items()
+    waiting = (p.held_back.keys() for i, p in current if p.held_back and i != proposals.writing)
     state = "interrupted" if ledger.open or lost else "idle"
     return PushView(
         policy=proposals.settings.mode.value,
