@@ -26,7 +26,7 @@ class Pupil:
 
     def learn(self, _samples, **_):
         self.meanwhile()
-        return SimpleNamespace(news=(), diagnosing=(), of=self.who)
+        return SimpleNamespace(news=(), diagnosing=(), flight=None, of=self.who)
 
     def save(self, _saved_at):
         pass
