@@ -90,6 +90,8 @@ class Journal:
         self._encoder = msgspec.json.Encoder()
         self._decoder = msgspec.json.Decoder(Entry)
         self.damaged = 0
+        self.appended = 0
+        """Entries since it was opened: the last ones."""
         self._size = 0
         self._torn = False
         self._fd = -1
@@ -148,6 +150,7 @@ class Journal:
         self._torn = False
         self._size += len(line)
         self._lines.append((at, entry))
+        self.appended += 1
         self._changed()
         if self._size > self._limit and isinstance(entry, Closed | _REMARKS):
             self._compact()

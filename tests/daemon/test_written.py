@@ -9,6 +9,7 @@ import pytest
 
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.view.accelerometers import imu_view
+from onboard.daemon.view.journal_lines import journal_view
 from onboard.daemon.view.written import LATEST_SHOWN, written_view
 from onboard.mavlink.parameter_messages import to_float32
 from onboard.push.entries import Closed, Planned, Purpose, Result, Verdict, Watched
@@ -131,3 +132,16 @@ def test_parameters_that_were_never_read_are_those_that_are_assumed():
     shown = imu_view(assumed, parameters=parameters(scale=(1.1, 1.1, 1.1)))
     assert shown.in_force_scale == (1.0, 1.0, 1.0)
     assert math.isclose(shown.held_out_before or 0.0, 4.0)
+
+
+def test_what_a_run_before_has_written_is_told_from_this_ones_whatever_the_clock_says(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    with Journal(path) as journal:
+        for entry in pushed("a"):
+            journal.append(entry, 5000.0)
+        assert not any(line.earlier for line in journal_view(journal.entries, journal.appended))
+    with Journal(path) as journal:  # after a boot without a clock
+        journal.append(Watched("a", Verdict.KEPT, "as it was"), 70.0)
+        lines = journal_view(journal.entries, journal.appended)
+        assert [line.earlier for line in lines] == [True, True, False]
+        assert [line.earlier for line in journal_view(journal.entries[-1:], 1)] == [False]

@@ -86,3 +86,29 @@ def test_everything_that_can_be_done_can_be_reached_by_tabulator(browser, served
         )
     assert {"tab-1", "approve-1", "reject-1", "approve-2", "reject-2", "reset-"} <= reached
     assert {"SUMMARY", "journal-lines"} <= reached
+
+
+@pytest.mark.slow
+def test_what_happened_last_stands_first_whatever_the_clock_was_set_to(browser, served):
+    browser.open(served.url)
+    names = browser.driver.execute_async_script(
+        """const done = arguments[0];
+        const line = (text, at, earlier = false) => ({ text, at, earlier });
+        const before = [line("of yesterday", 500, true), line("as well", 900, true)];
+        import('/static/link.js').then(({inOrder}) => done(inOrder(
+          [...before, line("begins", 120), line("is written", 5120), line("is done", 20)],
+          [line("found", 100), line("trusted", 5110), line("clock set back", 10)],
+        ).map((one) => one.text)));"""
+    )
+    assert names[-2:] == ["as well", "of yesterday"]
+    ours = names[:-2]
+    assert [n for n in ours if n in {"begins", "is written", "is done"}] == [
+        "is done",
+        "is written",
+        "begins",
+    ]
+    assert [n for n in ours if n in {"found", "trusted", "clock set back"}] == [
+        "clock set back",
+        "trusted",
+        "found",
+    ]

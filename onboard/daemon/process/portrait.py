@@ -56,7 +56,9 @@ class Portrait:
             imus=imus,
             push=push,
             parameters=finite_values(self.parts.parameters.values),
-            journal=journal_view(self.parts.journal.entries[-limits.JOURNAL_SHOWN :]),
+            journal=journal_view(
+                self.parts.journal.entries[-limits.JOURNAL_SHOWN :], self.parts.journal.appended
+            ),
             notices=self.parts.notices.kept,
             counters=self._counters(),
             diagnosis=self.parts.diagnoses.document,

@@ -22,11 +22,18 @@ from onboard.push.entries import (
 )
 
 
-def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...]:
-    """The journal for people, oldest first; read-backs go without saying."""
+def journal_view(
+    lines: Sequence[tuple[float, Entry]], of_this_run: int = 0
+) -> tuple[JournalLine, ...]:
+    """The journal for people, oldest first; read-backs go without saying.
+
+    Args:
+        lines: entries with their Unix time.
+        of_this_run: so many of them, the last ones.
+    """
     imus: dict[str, int] = {}
     shown = []
-    for at, entry in lines:
+    for number, (at, entry) in enumerate(lines, start=1):
         match entry:
             case Planned(transaction, plan, purpose, support):
                 imus[transaction] = plan.imu
@@ -60,6 +67,7 @@ def journal_view(lines: Sequence[tuple[float, Entry]]) -> tuple[JournalLine, ...
                 transaction=entry.transaction,
                 imu=imus.get(entry.transaction),
                 text=text,
+                earlier=number <= len(lines) - of_this_run,
             )
         )
     return tuple(shown)

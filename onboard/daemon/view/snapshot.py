@@ -46,7 +46,8 @@ class EndpointView(Record, frozen=True, kw_only=True):
 class LinkView(Record, frozen=True, kw_only=True):
     """Health of the link and identity of the autopilot behind it.
 
-    ``warnings``: what on the wire is not as it should be now, one sentence each.
+    ``warnings``: what on the wire, or of the estimator, is not as it should be now, one sentence
+    each.
     """
 
     state: str
@@ -262,13 +263,17 @@ class PushView(Record, frozen=True, kw_only=True):
 
 
 class JournalLine(Record, frozen=True, kw_only=True):
-    """One fact of the journal for people; ``at`` is Unix time."""
+    """One fact of the journal for people; ``at`` is Unix time.
+
+    ``earlier``: of a run of the service before this one, whatever its time says: clocks are set.
+    """
 
     at: float
     kind: str
     transaction: str
     imu: int | None
     text: str
+    earlier: bool = False
 
 
 class Notice(Record, frozen=True, kw_only=True):

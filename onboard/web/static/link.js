@@ -54,12 +54,25 @@ function ratesTable(rates) {
 // What has a line of the journal needs no second one, unless it is a warning.
 const isNews = ({ kind, warning }) => warning || !/^(push|roll_back)_|^diagnosed$/.test(kind);
 
+/**
+ * What the journal has of this run and the notices, which are all of this run, then the journal of
+ * before; newest first.  Companions without a clock of their own set it at any moment, and begin
+ * with one that is behind: what a list has in its order stays in it, whatever the times say.
+ */
+export function inOrder(journal, notices) {
+  const now = journal.filter((line) => !line.earlier);
+  const lines = [];
+  for (let [i, j] = [now.length, notices.length]; i + j > 0; )
+    lines.push(j === 0 || (i > 0 && now[i - 1].at > notices[j - 1].at) ? now[--i] : notices[--j]);
+  return [...lines, ...journal.filter((line) => line.earlier).reverse()];
+}
+
 /** Journal and notices in one list, newest first. */
 export function showJournal(journal, notices) {
-  const lines = [
-    ...journal.map((line) => ({ at: line.at, text: line.imu ? `IMU ${line.imu}: ${line.text}` : line.text, kind: "" })),
-    ...notices.filter(isNews).map((notice) => ({ at: notice.at, text: notice.text, kind: notice.warning ? "warn" : "" })),
-  ].sort((a, b) => b.at - a.at);
+  const lines = inOrder(
+    journal.map((line) => ({ at: line.at, text: line.imu ? `IMU ${line.imu}: ${line.text}` : line.text, kind: "", earlier: line.earlier })),
+    notices.filter(isNews).map((notice) => ({ at: notice.at, text: notice.text, kind: notice.warning ? "warn" : "" })),
+  );
   renew(byId("journal-lines"), lines, () =>
     lines.length
       ? lines.map((line) => h("li", {}, h("time", { datetime: new Date(line.at * 1000).toISOString(), text: clockTime(line.at) }), h("span", { class: line.kind, text: line.text })))

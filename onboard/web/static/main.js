@@ -39,7 +39,7 @@ function showHeader({ link, mode, mode_reason: why, phase, version: number, upti
   if (link.landed !== null) flags.push([link.landed ? "on the ground" : "in the air", ""]);
   if (mode !== "active") flags.push([mode.replaceAll("_", " "), "warn"]);
   const warnings = link.warnings ?? [];
-  if (warnings.length) flags.push([warnings.length === 1 ? "1 warning on the link" : `${warnings.length} warnings on the link`, "warn"]);
+  if (warnings.length) flags.push([warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`, "warn"]);
   renew(byId("flags"), [flags, why], () => flags.map(([text, kind]) => h("span", { class: `pill ${kind}`, title: mode === "active" ? null : why, text })));
   say(byId("about"), `onboard ${number}, ${phase}, up ${duration(uptime)}`);
 }
