@@ -1,5 +1,7 @@
 """What a publisher is fed with in tests: snapshots, notices, and somebody who obeys."""
 
+import asyncio
+
 import msgspec
 
 from onboard.daemon.setup.configuration import MqttSettings
@@ -152,3 +154,11 @@ def noticeboard():
     notices = Notices(lambda: 0.0)
     notices.listen(kept.append)
     return notices, kept
+
+
+async def kinds(publisher, kind):
+    """Wait for a notice of this kind, and give all of them."""
+    async with asyncio.timeout(60.0):
+        while not (found := [n for n in publisher.kept if n.kind == kind]):
+            await asyncio.sleep(0.01)
+    return found

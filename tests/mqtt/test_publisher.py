@@ -11,17 +11,9 @@ import pytest
 from onboard.daemon.mqtt.publisher import _reason
 from onboard.daemon.view.snapshot import Snapshot
 from tests.mqtt.broker import Broker, Subscriber, free_port
-from tests.mqtt.published import Obedient, imu_view, journal_line, snapshot
+from tests.mqtt.published import Obedient, imu_view, journal_line, kinds, snapshot
 
 DIAGNOSIS = {"schema": "onboard.explain/1", "verdict": "clean", "effects": []}
-
-
-async def kinds(publisher, kind):
-    """Wait for a notice of this kind, and give all of them."""
-    async with asyncio.timeout(60.0):
-        while not (found := [n for n in publisher.kept if n.kind == kind]):
-            await asyncio.sleep(0.01)
-    return found
 
 
 async def until_counted(publisher, name, count):

@@ -1,6 +1,7 @@
 """Every number of this room that decides something: its unit, and where it comes from.
 
-Provenance in brackets: *service* (systemd/onboard.service), *cost* (memory), or *tuned*.
+Provenance in brackets: *service* (systemd/onboard.service), *cost* (memory), *use*
+(what people have of it), *physics*, or *tuned*.
 """
 
 from __future__ import annotations
@@ -19,6 +20,12 @@ BACKOFF_CAP_S: Final = 60.0
 """s; ceiling of every wait: nothing hangs on a broker, and many vehicles may share it [tuned]."""
 STABLE_S: Final = 10.0
 """s; a connection that held this long starts the back-off from the beginning [tuned]."""
+HANG_UPS: Final = 3
+"""Connections in a row that end alike before that is taken for the broker's way: two are chance,
+and each costs a pause [use]."""
+LASTING_S: Final = 120.0
+"""s; twice the longest pause: two clients of one id, each of which is hung up on when the other is
+back, have no connection that lasts as long [physics]."""
 FAREWELL_S: Final = 1.0
 """s for what waits and for the last word at shutdown [service: a stop takes two seconds]."""
 HANG_UP_S: Final = 0.2

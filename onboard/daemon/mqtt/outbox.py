@@ -6,6 +6,7 @@ retained document again: a broker that lost its memory has it back at once.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
@@ -28,6 +29,8 @@ class Outbox:
 
     def __init__(self, events_max: int = limits.EVENTS_MAX) -> None:
         self.dropped = 0
+        self.too_large = math.inf
+        """bytes; what is as large is not sent."""
         self._retained: dict[str, bytes] = {}
         self._due: dict[str, None] = {}
         self._events: deque[Parcel] = deque()
@@ -53,7 +56,11 @@ class Outbox:
     def next(self) -> Parcel | None:
         """What to send now, None if nothing; retained documents go first."""
         for topic in self._due:
-            return Parcel(topic, self._retained[topic], retain=True)
+            if len(self._retained[topic]) < self.too_large:
+                return Parcel(topic, self._retained[topic], retain=True)
+        while self._events and len(self._events[0].payload) >= self.too_large:
+            self._events.popleft()
+            self.dropped += 1
         return self._events[0] if self._events else None
 
     def confirm(self, parcel: Parcel) -> None:

@@ -20,8 +20,9 @@ import aiomqtt
 from onboard.daemon.mqtt import limits
 from onboard.daemon.mqtt.client import Client
 from onboard.daemon.mqtt.commands import Commands
+from onboard.daemon.mqtt.hang_ups import HangUps
 from onboard.daemon.mqtt.home_assistant import discovery_message, discovery_topic
-from onboard.daemon.mqtt.outbox import Outbox, newer
+from onboard.daemon.mqtt.outbox import Outbox, Parcel, newer
 from onboard.daemon.mqtt.payloads import calibration_message, document, event_message
 from onboard.daemon.mqtt.place import Place
 from onboard.daemon.mqtt.summary import summary_message
@@ -42,6 +43,7 @@ library.setLevel(logging.CRITICAL)
 """The library's own log has a line for every attempt; what matters is told as a notice."""
 
 ONLINE, OFFLINE = b"online", b"offline"
+HUNG_UP = "the connection was lost"
 _LOST = (
     "Disconnected during message iteration",
     "The client is not currently connected.",
@@ -96,6 +98,9 @@ class Publisher:
         self._next_state = 0.0
         self._outage = Outage(limits.STABLE_S)
         self._refused = False
+        self._hang_ups = HangUps()
+        self._under_way: Parcel | None = None
+        self._connected_at = 0.0
         self._closing = asyncio.Event()
         self._hurried = False
         self._diagnosed = False
@@ -151,6 +156,7 @@ class Publisher:
                     logger.exception("MQTT failed")
             finally:
                 self.connected = False
+                self._under_way = None
             if self._closing.is_set():
                 return
             if self._clock() - began >= limits.STABLE_S:
@@ -187,7 +193,7 @@ class Publisher:
         client = Client(
             settings.host,
             settings.port,
-            identifier=settings.client_id or self.prefix.replace("/", "-"),
+            identifier=self._identifier,
             username=settings.username,
             password=self._password,
             will=aiomqtt.Will(self._place.topic("availability"), OFFLINE, qos=1, retain=True),
@@ -215,7 +221,7 @@ class Publisher:
         self._outbox.connected()
         await client.publish(self._place.topic("availability"), ONLINE, qos=1, retain=True)
         self.counters["mqtt_connects"] += 1
-        self.connected = True
+        self.connected, self._connected_at = True, self._clock()
         if self._outage.since is None:
             self._notices.post("mqtt_connected", f"broker {self._where}: publishing")
         self._outage.works(self._clock())
@@ -269,10 +275,13 @@ class Publisher:
         while True:
             self._news.clear()
             while (parcel := self._outbox.next()) is not None:
+                self._under_way = parcel
                 await client.publish(
                     self._place.topic(parcel.topic), parcel.payload, qos=1, retain=parcel.retain
                 )
                 self._outbox.confirm(parcel)
+                self._hang_ups.confirmed(parcel)
+                self._under_way = None
                 self.counters["mqtt_published"] += 1
             if self._closing.is_set():
                 return
@@ -287,6 +296,10 @@ class Publisher:
                 self._news.set()
 
     # How
+
+    @property
+    def _identifier(self) -> str:
+        return self._settings.client_id or self.prefix.replace("/", "-")
 
     @property
     def _where(self) -> str:
@@ -306,6 +319,10 @@ class Publisher:
     def _lost(self, reason: str) -> bool:
         """Say so once for each reason, and whether that was now; every further try only counts."""
         self.counters["mqtt_failures"] += 1
+        if not self.connected:
+            self._hang_ups.absent()
+        elif reason == HUNG_UP:
+            reason = self._hung_up()
         happened = self._outage.lost if self.connected else self._outage.failed
         told = happened(reason, self._clock())
         if told:
@@ -315,7 +332,28 @@ class Publisher:
             logger.debug("broker %s: %s", self._where, reason)
         return told
 
+    def _hung_up(self) -> str:
+        """The broker has ended a good connection: why, as far as its ways tell."""
+        parcel = self._under_way
+        if self._hang_ups.take(parcel, self._clock() - self._connected_at) and parcel is not None:
+            self._outbox.too_large = size = len(parcel.payload)
+            self._notices.post(
+                "mqtt_too_large",
+                f"broker {self._where} hangs up at {size} bytes ({parcel.topic.lstrip('/')}): "
+                "nothing as large is published; see its limit for packets",
+                warning=True,
+            )
+        elif self._hang_ups.again_and_again:
+            return (
+                "no connection lasts for two minutes: does another client have the id "
+                f"{self._identifier}? ([mqtt] client_id and prefix)"
+            )
+        return HUNG_UP
+
     def _tell_of_recovery(self, now: float) -> None:
+        lasted = now - self._connected_at
+        if self._hang_ups.again_and_again and not (self.connected and lasted >= limits.LASTING_S):
+            return  # what comes and goes is told of once
         over = self._outage.over(now)
         if over is not None:
             self._notices.post(
@@ -328,4 +366,4 @@ def _reason(error: Exception) -> str:
     text = _CODES.sub("", str(error) or type(error).__name__)
     if isinstance(error, aiomqtt.exceptions.MqttConnectError):
         return f"it refuses: {text}"
-    return "the connection was lost" if text in _LOST else text
+    return HUNG_UP if text in _LOST else text
