@@ -69,9 +69,14 @@ def test_all_accelerometers_are_judged_on_the_same_flight_however_late(flight, t
     later = [replace(s, t=s.t + 150.0) for s in flight if s.t is not None]
     ahead = [s for s in later if not isinstance(s, VehicleState)]
     one.learn([VehicleState(151.0, True, False), *ahead], judging=())  # it flies on meanwhile
-    assert one.examine().diagnosing == ()
+    last = one.examine()
+    assert last.diagnosing == ()
     assert [imu for imu, *_ in seen] == [1, 2]
     assert seen[0][1:] == seen[1][1:]
+    # That nothing could be made of it is said, and why; not that it was too short.
+    told = [(news.kind, news.text) for news in last.news]
+    assert [kind for kind, _ in told] == ["diagnosis_failed", "diagnosis_failed"]
+    assert all("ArithmeticError: only looking" in text for _, text in told)
 
 
 @pytest.mark.slow

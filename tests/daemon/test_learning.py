@@ -142,6 +142,9 @@ async def test_a_disk_that_takes_nothing_is_told_on_the_page_once_and_when_it_do
 async def test_before_the_first_flight_it_says_what_to_do(document, daemon, port):
     async with daemon(document) as service:
         assert service.snapshot().next_step is None, "nobody is there"
-        async with Vehicle(port):
+        async with Vehicle(port) as vehicle:
             await until(lambda: service.handover.learned is not None)
             assert service.snapshot().next_step.text.startswith("fly")
+            vehicle.stop_talking()
+            await until(lambda: service.snapshot().link.state == "silent")
+            assert "silent" in service.snapshot().next_step.text

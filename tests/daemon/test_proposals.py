@@ -8,7 +8,7 @@ import pytest
 
 from onboard.core.gps.trust import TrustWindow
 from onboard.daemon.learning.flight import Judged, JudgedFlight
-from onboard.daemon.learning.learner import Learned
+from onboard.daemon.learning.learned import Learned
 from onboard.daemon.pushing.people import approvable
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.view.trust import trust_view

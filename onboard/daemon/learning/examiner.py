@@ -62,6 +62,7 @@ class Frozen:
     landings: tuple[float, ...] = ()
     current: bool = True
     changed: dict[int, str] = field(default_factory=dict)
+    failed: dict[int, str] = field(default_factory=dict)
     imus: dict[int, Judged] = field(default_factory=dict)
 
 
@@ -69,12 +70,14 @@ class Frozen:
 class Examined:
     """A flight that was judged, and the sums that it ended with, of every accelerometer.
 
-    ``changed``: accelerometers that are others since one of its landings, and by what that shows.
+    ``changed``: accelerometers that are others since one of its landings, and by what that shows;
+    ``failed``: those of which no diagnosis could be made, a sentence each.
     """
 
     flight: JudgedFlight
     sums: tuple[SavedEngine, ...]
     changed: Mapping[int, str]
+    failed: Mapping[int, str]
 
 
 class Examiner:
@@ -152,7 +155,7 @@ class Examiner:
             return None
         self._frozen = None
         flight = JudgedFlight(frozen.support, frozen.imus, frozen.current)
-        return Examined(flight, tuple(frozen.flight.sums), frozen.changed)
+        return Examined(flight, tuple(frozen.flight.sums), frozen.changed, frozen.failed)
 
     def _freeze(self, flight: Calibrator) -> None:
         trusted_s = flight.flown_s - self._judged_s
@@ -178,7 +181,9 @@ class Examiner:
             found = diagnosed(given, document)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers no model fits
             self.counters["diagnosis_failed"] += 1
-            logger.warning("IMU %d: the flight could not be diagnosed: %s", imu, error)
+            logger.exception("IMU %d: the flight could not be diagnosed", imu)
+            why = f"nothing of it is written ({type(error).__name__}: {error})"
+            frozen.failed[imu] = f"IMU {imu}: the flight could not be diagnosed: {why}"
             return
         if imu in frozen.changed:
             found = replace(found, calibration=_alone(found.calibration))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from onboard.daemon.learning import limits
-from onboard.daemon.learning.learner import Learned
+from onboard.daemon.learning.learned import Learned
 
 
 class LearnerError(Exception):

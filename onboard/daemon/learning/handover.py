@@ -19,7 +19,8 @@ from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.failures import Failures, LearnerError
 from onboard.daemon.learning.identity import Identity
-from onboard.daemon.learning.learner import Learned, Learner
+from onboard.daemon.learning.learned import Learned
+from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.worker import Worker
 from onboard.daemon.view.notices import Notices
 from onboard.errors import OnboardError, StateError

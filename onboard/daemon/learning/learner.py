@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 import msgspec
 
@@ -37,6 +36,7 @@ from onboard.daemon.learning.flight import JudgedFlight, known_now
 from onboard.daemon.learning.heap import trim
 from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.kept import Kept, calibrator_anew, name_of_a_flight
+from onboard.daemon.learning.learned import Learned, News
 from onboard.daemon.learning.meaning import (
     Meaning,
     carried,
@@ -49,38 +49,8 @@ from onboard.daemon.learning.opening import Opening
 from onboard.daemon.learning.proof import ProofFlight, answers
 from onboard.daemon.learning.shelf import Shelf
 from onboard.daemon.learning.store import Store
-from onboard.daemon.view.snapshot import TrustView
 from onboard.daemon.view.trust import trust_view
 from onboard.errors import StateError
-
-
-@dataclass(frozen=True, slots=True)
-class News:
-    """Something that a person should hear of: kind, sentence, and whether it is a warning."""
-
-    kind: str
-    text: str
-    warning: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Learned:
-    """Where the learner stands after a batch.
-
-    ``calibrations`` are of the last flight as it was judged, or of what was flown since then;
-    ``flown`` is the answer of the flight that has just ended, if a push waits for it; ``flight``
-    the one that was judged, None if none was or a new one is not judged yet; ``diagnosing`` the
-    accelerometers of one that is being judged; ``flying``: the end of one is not learned yet.
-    """
-
-    calibrations: dict[int, Calibration]
-    trust: TrustView
-    counters: dict[str, int]
-    news: tuple[News, ...] = ()
-    flown: dict[int, Calibration] = field(default_factory=dict)
-    flight: JudgedFlight | None = None
-    diagnosing: tuple[int, ...] = ()
-    flying: bool = False
 
 
 class Learner:
@@ -275,6 +245,8 @@ class Learner:
 
     def _keep(self, examined: Examined) -> None:
         """Keep sums of what nothing was missing in, and nothing false."""
+        for sentence in examined.failed.values():
+            self._tell("diagnosis_failed", sentence, warning=True)
         for imu, found in examined.flight.diagnosed.items():
             changed = examined.changed.get(imu)
             if found.missing or changed:
@@ -296,9 +268,9 @@ class Learner:
         self._unjudged = False
         taken = flight.after(self._flight)
         if taken is None:
-            self._tell(
-                "flight_too_short", "the flight says too little: what was known before stays"
-            )
+            if flight.imus:  # else it was said that none could be diagnosed
+                text = "the flight says too little: what was known before stays"
+                self._tell("flight_too_short", text)
             return
         self._flight = taken
         for imu, found in flight.diagnosed.items():

@@ -19,6 +19,7 @@ from onboard.daemon.view.numbers import finite_values
 from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
 from onboard.daemon.view.state import ERROR, INFO, WARNING, Circumstances, next_step
 from onboard.daemon.view.trust import NO_TRUST
+from onboard.mavlink.autopilot import AutopilotState
 from onboard.push.policy import VehicleCondition
 
 
@@ -95,6 +96,9 @@ class Portrait:
             return StepView(imu=None, text=hindered, severity=WARNING)
         if self.parts.link.autopilot is None or self.parts.handover.learned is None:
             return None
+        if self.parts.link.state is AutopilotState.SILENT:
+            text = "the autopilot is silent: see to its power and to the line"
+            return StepView(imu=None, text=text, severity=WARNING)
         return StepView(imu=None, text="fly: standing teaches nothing", severity=INFO)
 
     def sentence(self, now: float) -> str:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from onboard.daemon.learning.learner import Learned
+from onboard.daemon.learning.learned import Learned
 from onboard.daemon.outlets.door import Door
 from onboard.daemon.outlets.outlets import Outlets
 from onboard.daemon.process import limits

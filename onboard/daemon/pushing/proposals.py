@@ -25,7 +25,7 @@ from typing import Protocol
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.daemon.learning.flight import JudgedFlight
-from onboard.daemon.learning.learner import Learned
+from onboard.daemon.learning.learned import Learned
 from onboard.daemon.pushing import limits
 from onboard.daemon.pushing.people import DIAGNOSIS, approvable, named, told
 from onboard.errors import PushError, RefusedError

@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 import msgspec
 
 from onboard.daemon.learning.flight import JudgedFlight
-from onboard.daemon.learning.learner import Learned
+from onboard.daemon.learning.learned import Learned
 from onboard.daemon.pushing.aftercare import ASKED
 from onboard.daemon.pushing.duties import Duties
 from onboard.daemon.pushing.ledger import Ledger
