@@ -6,6 +6,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from onboard.cli.happened import happened
 from onboard.cli.panel import decimal, duration, gps, headline, last_push, residual, when, who
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.daemon.view.snapshot import ImuView, Snapshot
@@ -16,6 +17,8 @@ ROOMY = 2
 ROWS = 4
 WARNINGS = 2
 """What is wrong on the wire takes no more lines than that: the page has all of it."""
+LEAST = 3
+"""Lines above all accelerometers, however many there are."""
 IMU_LINES = 4
 """Of an accelerometer, besides the rows of its table."""
 
@@ -28,8 +31,10 @@ def compact(snapshot: Snapshot, height: int) -> RenderableType:
     top += [Text(f"warning: {said}", style="yellow") for said in snapshot.link.warnings[:WARNINGS]]
     bottom = [_push(snapshot)]
     if len(snapshot.imus) <= ROOMY:
-        bottom += [when(line.at, line.text) for line in snapshot.journal[-JOURNAL_LINES:]]
+        bottom += [when(line) for line in happened(snapshot)[-JOURNAL_LINES:]]
     bottom.append(Text("Ctrl-C ends it; --full shows everything", style="dim"))
+    spare = height - len(bottom) - len(snapshot.imus) * (IMU_LINES + 2)
+    top = top[: max(spare, LEAST)]
     each = (height - len(top) - len(bottom)) // max(len(snapshot.imus), 1)
     rows = min(max(each - IMU_LINES, 1), ROWS)
     imus = [_imu(snapshot, imu, rows) for imu in snapshot.imus]

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from onboard.answers.words import DISTRUST
+from onboard.cli.happened import Line, happened
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.maths.accelerometer import parameter_names
 from onboard.daemon.view.snapshot import AccountView, ImuView, Snapshot, WrittenView
@@ -216,13 +217,24 @@ def _push(snapshot: Snapshot) -> RenderableType:
     if push.last_outcome:
         text.append(f"\n last: {push.last_outcome}", style="default")
     lines: list[RenderableType] = [text]
-    lines += [when(line.at, line.text) for line in snapshot.journal[-JOURNAL_LINES:]]
-    return Group(*lines)
+    table = Table.grid(padding=(0, 2))
+    for line in happened(snapshot)[-JOURNAL_LINES:]:
+        table.add_row(f" {clock(line.at)}", line.text, style=_style(line))
+    return Group(*lines, table)
 
 
-def when(at: float, text: str) -> Text:
-    """A line of the journal."""
-    return Text(f" {time.strftime('%H:%M:%S', time.localtime(at))}  {text}", style="dim")
+def when(line: Line) -> Text:
+    """A line of what has happened."""
+    return Text(f" {clock(line.at)}  {line.text}", style=_style(line))
+
+
+def _style(line: Line) -> str:
+    return "yellow" if line.warning else "dim"
+
+
+def clock(at: float) -> str:
+    """A moment of today."""
+    return time.strftime("%H:%M:%S", time.localtime(at))
 
 
 def _moment(at: float) -> str:

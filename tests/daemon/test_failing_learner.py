@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from onboard.cli.panel import panel
+from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.failures import Failures, LearnerError
 from onboard.daemon.learning.learner import Learner
@@ -22,14 +23,15 @@ class BrokenError(RuntimeError):
 @pytest.fixture
 def broken(monkeypatch):
     """The next ``times`` batches with a sample in them raise, whoever learns them."""
-    state = SimpleNamespace(times=0, learners=[])
+    state = SimpleNamespace(times=0, learners=[], taught=False)
     learn = Learner.learn
 
     def failing(self, samples, **how):
         samples = list(samples)
         if self not in state.learners:
             state.learners.append(self)
-        if state.times and any(type(sample).__name__ == "ImuSample" for sample in samples):
+        state.taught = any(isinstance(sample, ImuSample) for sample in samples)
+        if state.times and state.taught:
             state.times -= 1
             raise BrokenError("no such thing")
         return learn(self, samples, **how)
@@ -104,7 +106,7 @@ async def test_one_that_fails_again_and_again_rests_and_what_was_written_can_be_
 
         snapshot = service.snapshot()
         assert snapshot.next_step.severity == "error"
-        assert "restart" in snapshot.next_step.text
+        assert "next flight" in snapshot.next_step.text
         assert snapshot.next_step.text in snapshot.link.warnings
         assert snapshot.next_step.text == service._portrait.sentence(service._clock())
         assert panel(snapshot) is not None
@@ -112,6 +114,14 @@ async def test_one_that_fails_again_and_again_rests_and_what_was_written_can_be_
 
         await service.rollback((1,))
         await until(lambda: in_force(vehicle) == before)
+
+        # The next flight is another matter.
+        await ticks(service, 20)
+        broken.times = 0
+        vehicle.armed = True
+        await until(lambda: service.snapshot().next_step.severity != "error")
+        assert not service.snapshot().link.warnings
+        await until(lambda: broken.taught)
         recorded = tmp_path / "state" / "after-failure"
         assert list(recorded.glob("*.tlog"))
     assert sum(path.stat().st_size for path in recorded.glob("*.tlog")) > 0
@@ -163,3 +173,19 @@ def test_who_has_judged_a_flight_has_got_over_what_was_before():
     judged("kept from before", current=False)
     assert [fails() for _ in range(limits.FAILURES_MAX)][-1] == "learner_stopped"
     assert failures.stopped
+
+
+def test_who_rests_in_flight_rests_until_it_is_armed_again():
+    failures, ours = Failures(), ParameterValue("INS_ACCOFFS_X", 0.1)
+    flown = ImuSample(t=1.0, imu=1, f_b=(0.0, 0.0, -9.8))
+    for _ in range(limits.FAILURES_MAX):
+        error = LearnerError("the estimator has failed")
+        error.__cause__ = BrokenError("again")
+        failures.take(error)
+    states = (True, True, None, False, False)  # armed
+    for armed in states:
+        state = VehicleState(1.0, armed, landed=None)
+        assert failures.left_over([ours, flown, state]) == [ours, state]
+    state = VehicleState(2.0, True, landed=None)
+    assert failures.left_over([ours, flown, state]) == [ours, flown, state]
+    assert not failures.stopped

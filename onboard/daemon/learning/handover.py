@@ -3,8 +3,8 @@
 **A learner that fails** (a mistake of ours: it never raises on data that is merely bad) takes
 nobody along.  Link, parameters, page and a push under way go on; another learner takes its place
 and begins as after a restart of the service, from what is on the disk.  Where several fail before
-one flight was judged, the last one is *resting*: it is told who is there and which parameters are
-in force, so that everything written can still be audited, approved and rolled back, but no flight.
+one flight was judged, the last one *rests* until the next flight: it is told who is there and which
+parameters are in force, so that everything written can still be audited, approved and rolled back.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import ParamSpec, Protocol, TypeVar
 
-from onboard.core.inputs.samples import ParameterValue, Sample, VehicleState
+from onboard.core.inputs.samples import ParameterValue, Sample
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.failures import Failures, LearnerError
 from onboard.daemon.learning.identity import Identity
@@ -32,8 +32,6 @@ from onboard.outage import Outage
 
 P = ParamSpec("P")
 T = TypeVar("T")
-RESTING = (ParameterValue, VehicleState)
-"""What a learner is told that learns no flight."""
 logger = logging.getLogger(__name__)
 
 
@@ -198,7 +196,7 @@ class Handover:
         """Another learner takes the place of one that has failed, or there is none left.
 
         Raises:
-            LearnerError: one has failed that learns no flight any more.
+            LearnerError: one has failed that rests.
         """
         if self._successor is None or self.failures.stopped:
             raise failure
@@ -206,7 +204,7 @@ class Handover:
         logger.error("the estimator has failed", exc_info=failure.__cause__)
         self._notices.post(*self.failures.take(failure), warning=True)
         self._learner, self._succeeded = self._successor(), True
-        self._begun = self._taught = False
+        self._begun = self._taught = self._rebooted = False
         self._arrived = self._taken = self._busy_since = self._before_gap = None
 
     async def step(self) -> None:
@@ -265,8 +263,7 @@ class Handover:
 
     def _next_batch(self) -> list[Sample]:
         samples, self._samples = self._samples, []
-        if self.failures.stopped:
-            samples = [s for s in samples if type(s) in RESTING]
+        samples = self.failures.left_over(samples)
         self._taken, self._arrived = self._arrived, None
         return samples
 

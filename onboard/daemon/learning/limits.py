@@ -27,8 +27,8 @@ STEP_LIMIT_S: Final = 120.0
 [cost]."""
 
 FAILURES_MAX: Final = 3
-"""Learners that may fail before one flight was judged in full: one by chance, one that the flight
-makes fail again, and then nothing else is to be expected of it [use]."""
+"""Learners that may fail of one flight: one by chance, one that the flight makes fail again, and
+then nothing else is to be expected of it [use]."""
 
 FILTER_SILENT_S: Final = 5.0
 """s of an open window without a report of the autopilot's filter: it sends none.  Two a second are

@@ -52,7 +52,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "imu_state": Line(NOTICE),
         "imu_stuck": Line(ERROR, "", "stuck {imu}", limits.FLAPPING_S),
         "learner_failed": Line(WARNING, "estimator failed, learns anew"),
-        "learner_stopped": Line(ERROR, "estimator failed, restart the service"),
+        "learner_stopped": Line(ERROR, "estimator failed, this flight is lost"),
         "advise_only": Line(WARNING, "writes nothing, see the status page"),
         "state_refused": Line(WARNING, "saved calibration unusable, starts anew"),
         "push_begins": Line(INFO, "{imu} writing calibration", "push {imu}"),

@@ -69,7 +69,7 @@ class Vigilance:
 
     @property
     def stopped(self) -> str:
-        """Why no flight is learned until the service is restarted, in a sentence; else empty."""
+        """Why nothing is learned before the next flight, in a sentence; else empty."""
         return self._failures.stopped
 
     def hindered(self, now: float) -> str:
