@@ -7,6 +7,7 @@ and with MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES where the firmware is too old fo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -46,7 +47,9 @@ class Board:
     """Asks who the board is; has the shape of a :class:`onboard.mavlink.link.Participant`.
 
     A board can be changed for another one only while it has no power, so whatever was known
-    ends with each ``start``: between that and the answer nothing is known.
+    ends with each ``start``: between that and the answer nothing is known.  Where two vehicles have
+    one system id on one line, both answer.  So another answer than before counts when it comes
+    twice: once it may be late, from before a reboot, and who is back after it is one of two.
     """
 
     names: ClassVar[tuple[str, ...]] = ("AUTOPILOT_VERSION", "COMMAND_ACK")
@@ -58,6 +61,10 @@ class Board:
         self._tries = 0
         self._next = 0.0
         self._given_up = False
+        self._other = ""
+        self._again = False
+        self._asked_at = -math.inf
+        self._two_at = -math.inf
 
     @property
     def uid(self) -> str:
@@ -72,6 +79,15 @@ class Board:
     @property
     def answered(self) -> bool:
         """Whether there is nothing more to wait for: it told, or all tries were in vain."""
+        return self._done and not self.in_doubt
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether its last answer was another one than that before."""
+        return bool(self._other)
+
+    @property
+    def _done(self) -> bool:
         return self.identity is not None or self._given_up
 
     def start(self, system: int, component: int, now: float) -> None:
@@ -80,23 +96,45 @@ class Board:
         self.identity = None
         self._tries = 0
         self._next = now
-        self._given_up = False
+        self._given_up = self._again = False
+        self._other = ""
+
+    def confirm(self, now: float) -> None:
+        """Have it asked anew if that was long ago: is there one still, and only one?"""
+        if self.uid and now - self._asked_at >= limits.BOARD_ASKED_S:
+            self._again = True
+
+    def are_two(self, now: float) -> bool:
+        """Whether two boards have answered in turn of late."""
+        return now - self._two_at < limits.TWO_BOARDS_S
 
     def poll(self, now: float) -> Sequence[Message]:
         """The question that is due, if one is."""
-        if self._target is None or self.answered or now < self._next:
+        asked = now - self._asked_at
+        if self._target is not None and self._done and self._again:
+            late = asked >= limits.ANSWER_TIMEOUT_S[0]
+            return (self._question(self._target, self._stage(), now),) if late else ()
+        if self._target is None or self._done or now < self._next:
             return ()
         if self._tries == len(limits.ANSWER_TIMEOUT_S):
             self._given_up = True
             return ()
-        number, parameter = COMMANDS[self._tries // _TRIES_EACH]
-        confirmation = self._tries % _TRIES_EACH
+        stage, confirmation = divmod(self._tries, _TRIES_EACH)
         self._next = now + limits.ANSWER_TIMEOUT_S[self._tries]
         self._tries += 1
-        return (
-            mavlink.MAVLink_command_long_message(
-                *self._target, number, confirmation, parameter, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            ),
+        return (self._question(self._target, stage, now, confirmation),)
+
+    def _stage(self) -> int:
+        """In which words it was asked last: those that it has answered."""
+        return max(0, self._tries - 1) // _TRIES_EACH
+
+    def _question(
+        self, target: tuple[int, int], stage: int, now: float, confirmation: int = 0
+    ) -> Message:
+        self._again, self._asked_at = False, now
+        number, parameter = COMMANDS[stage]
+        return mavlink.MAVLink_command_long_message(
+            *target, number, confirmation, parameter, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         )
 
     def feed(self, message: Message, now: float) -> Sequence[Message]:
@@ -104,19 +142,28 @@ class Board:
         if (message.get_srcSystem(), message.get_srcComponent()) != self._target:
             return ()
         if message.get_msgId() == MESSAGE_IDS["AUTOPILOT_VERSION"]:
-            self.identity = identity(message)
+            self._told(identity(message), now)
         elif self._refuses(message):
             # No use in asking in the same words again.
-            stage = (self._tries - 1) // _TRIES_EACH
-            self._tries = (stage + 1) * _TRIES_EACH
+            self._tries = (self._stage() + 1) * _TRIES_EACH
             self._next = now
         return ()
 
+    def _told(self, answer: BoardIdentity, now: float) -> None:
+        known = self.uid
+        if answer.uid and known and answer.uid not in {known, self._other}:
+            self._other = answer.uid
+            self._again |= not self.are_two(now)  # which of them is there now?
+            return
+        if self.in_doubt and answer.uid == known:
+            self._two_at = now
+        self.identity, self._other = answer, ""
+
     def _refuses(self, ack: Message) -> bool:
         """Whether this is a no to the question that was asked last."""
-        if self._target is None or self.answered or not self._tries:
+        if self._target is None or self._done or not self._tries:
             return False
-        asked, _ = COMMANDS[(self._tries - 1) // _TRIES_EACH]
+        asked, _ = COMMANDS[self._stage()]
         return (
             ack.command == asked
             and ack.result in REFUSALS

@@ -123,6 +123,11 @@ EARLY_PARAMETERS: Final = 3000
 
 # Which board answers
 
+BOARD_ASKED_S: Final = 30.0
+"""s between two questions to a board that has said which it is: as often as its parameters are read
+anew, in a hundred bytes [cost]."""
+TWO_BOARDS_S: Final = 100.0
+"""s after two boards have answered in turn for which both are there: three questions [data]."""
 ANSWER_TIMEOUT_S: Final = (1.0, 1.0, 2.0, 4.0, 1.0, 1.0, 2.0, 4.0)
 """s that each try waits before the next one.
 

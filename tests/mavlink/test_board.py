@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from onboard.mavlink import limits
 from onboard.mavlink.board import COMMANDS, Board, BoardIdentity
 from onboard.mavlink.dialect import mavlink
 from tests.mavlink.mavlink_peer import LossyLine, received
@@ -178,3 +179,63 @@ def test_the_firmware_is_told_as_people_know_it(number, text):
     board.start(1, 1, 0.0)
     board.feed(received(version(firmware=number)), 0.1)
     assert board.firmware == text
+
+
+class Two(Vehicle):
+    """Another autopilot, with the same system id, hears every question, too, from ``since`` on."""
+
+    def __init__(self, since=0.0, until=1e9, **more) -> None:
+        super().__init__(**more)
+        self._from, self._to = self.now + since, self.now + until
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds)):
+            self.board.confirm(self.now)
+            super().run(1.0)
+
+    def _answers(self, question):
+        answers = super()._answers(question)
+        if self._from <= self.now < self._to and question.command in self.knows:
+            answers = [*answers, received(version(OTHER))]
+        return answers
+
+
+@pytest.mark.parametrize("knows", [(NEW, OLD), (OLD,)])
+@pytest.mark.parametrize("since", [0.0, 45.0])
+def test_two_boards_under_one_system_id_are_found_and_forgotten_when_one_has_gone(knows, since):
+    vehicle = Two(since=since, until=since + 90.0, knows=knows)
+    vehicle.run(max(since - 1.0, 0.0))
+    assert not vehicle.board.are_two(vehicle.now)
+    vehicle.run(2.0 * limits.BOARD_ASKED_S)
+    assert vehicle.board.are_two(vehicle.now)
+    vehicle.run(90.0 + limits.TWO_BOARDS_S + limits.BOARD_ASKED_S)
+    assert not vehicle.board.are_two(vehicle.now)
+
+
+def test_one_that_is_asked_now_and_then_is_one():
+    vehicle = Two(since=1e9, until=2e9)
+    vehicle.run(300.0)
+    assert vehicle.asked == [NEW] * len(vehicle.asked)
+    assert 5 <= len(vehicle.asked) <= 300.0 / limits.BOARD_ASKED_S + 1
+    assert not vehicle.board.are_two(vehicle.now)
+    assert vehicle.board.uid == UID2.hex()
+
+
+def test_a_late_answer_of_before_a_reboot_is_of_no_second_board():
+    vehicle = Two(since=1e9, until=2e9)
+    vehicle.run(5.0)
+    vehicle.reboot(uid2=OTHER)
+    assert vehicle.board.feed(received(version(UID2)), vehicle.now) == ()
+    vehicle.run(200.0)
+    assert vehicle.board.uid == OTHER.hex()
+    assert not vehicle.board.are_two(vehicle.now)
+
+
+def test_any_number_of_ids_takes_few_questions():
+    board = Board()
+    board.start(1, 1, 0.0)
+    asked = 0
+    for n in range(10_000):
+        board.feed(received(version(uid2=bytes(18), uid=n + 1)), 0.01 * n)
+        asked += len(board.poll(0.01 * n))
+    assert asked <= 101

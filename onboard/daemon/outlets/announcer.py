@@ -80,6 +80,7 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
             WARNING, "link brings too little to learn from", "seldom", limits.FLAPPING_S
         ),
         "heartbeats_contradict": Line(WARNING, "two speak as the vehicle, not writing"),
+        "two_vehicles": Line(WARNING, "two vehicles have one system id, not writing"),
         "rivals": Line(WARNING, "somebody else speaks as the vehicle"),
         "twin": Line(WARNING, "another onboard service is there"),
         "samples_contradict": Line(WARNING, "samples contradict, not writing"),

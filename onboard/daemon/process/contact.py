@@ -46,7 +46,7 @@ class Contact:
         self._parts = parts
         self._life = life
         self._silence, self._reboots = Outage(), Outage()
-        self._yields = False
+        self._yields = self._two = False
         self._next_kept = 0.0
 
     def on_link_event(self, now: float, event: LinkEvent) -> None:
@@ -96,9 +96,15 @@ class Contact:
         parts.vigilance.tell(now)
         if parts.handover.repetitions.contradictions:
             parts.proposals.doubt = "samples contradict each other: find out who sends, then reset"
-        yields = not parts.link.twins.first(now)
-        if yields != self._yields:
-            self._yields = yields
+        parts.board.confirm(now)
+        yields, two = not parts.link.twins.first(now), parts.board.are_two(now)
+        if two and not self._two:
+            parts.pusher.stop("two autopilots answer as one system", now)
+        if two:
+            doubt = "two autopilots have spoken as one system: reset, then fly again"
+            parts.proposals.doubt = doubt
+        if (yields, two) != (self._yields, self._two):
+            self._yields, self._two = yields, two
             self._decide()
         if now >= self._next_kept:
             self._next_kept = now + limits.SIGNING_KEPT_S
@@ -112,6 +118,10 @@ class Contact:
             self._advise_only(
                 f"the autopilot is {autopilot.firmware_name}, not ArduPilot: "
                 "nothing is written to it"
+            )
+        elif autopilot is not None and self._two:
+            self._advise_only(
+                f"two autopilots answer as system {autopilot.system}: give each a number of its own"
             )
         elif self._yields:
             self._advise_only("another onboard service was there first")

@@ -109,6 +109,7 @@ class Parts:
             handover=handover,
             vigilance=Vigilance(
                 link,
+                board,
                 observed,
                 signing,
                 handover.repetitions,

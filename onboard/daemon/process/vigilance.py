@@ -10,6 +10,7 @@ from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.autopilot import AutopilotState
+from onboard.mavlink.board import Board
 from onboard.mavlink.link import Link
 from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
@@ -27,6 +28,7 @@ class Vigilance:
 
     Args:
         link: what is heard, and of whom.
+        board: which board it says that it is.
         observed: the vehicle's condition.
         signing: the key's bookkeeping, None without a key.
         repetitions: samples with one time stamp and different content.
@@ -38,6 +40,7 @@ class Vigilance:
     def __init__(
         self,
         link: Link,
+        board: Board,
         observed: Observed,
         signing: Signing | None,
         repetitions: Repetitions,
@@ -46,6 +49,7 @@ class Vigilance:
         notices: Notices,
     ) -> None:
         self._link = link
+        self._board = board
         self._observed = observed
         self._signing = signing
         self._repetitions = repetitions
@@ -98,6 +102,14 @@ class Vigilance:
             yield (
                 "heartbeats_contradict",
                 "heartbeats say armed and disarmed at the same time: nothing is written",
+            )
+        if self._board.are_two(now) and self._link.autopilot is not None:
+            yield (
+                "two_vehicles",
+                (
+                    f"two autopilots answer as system {self._link.autopilot.system}: give each an "
+                    "id of its own (MAV_SYSID, SYSID_THISMAV), then reset what was learned"
+                ),
             )
         if self._link.twins.there(now):
             yield (
