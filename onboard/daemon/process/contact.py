@@ -121,7 +121,7 @@ class Contact:
             )
         elif autopilot is not None and self._two:
             self._advise_only(
-                f"two autopilots answer as system {autopilot.system}: give each a number of its own"
+                f"two autopilots answer as system {autopilot.system}: give each an id of its own"
             )
         elif self._yields:
             self._advise_only("another onboard service was there first")
