@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import logging
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 from onboard.errors import ConfigurationError
@@ -23,7 +24,7 @@ class Recorder:
     """Appends frames to a file; all disk work happens on a worker thread.
 
     An SD card can stall a write for seconds, which the loop must not feel.  A disk that
-    fails ends the recording, with one line in the log, and never the calibration.
+    fails ends the recording, which is told once, and never the calibration.
 
     Raises:
         ConfigurationError: the file cannot be created.
@@ -31,6 +32,8 @@ class Recorder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.tell: Callable[[str], object] = _log.error
+        """Where that is told, on the loop."""
         self.frames = 0
         self.dropped = 0
         self._pending = bytearray()
@@ -79,7 +82,7 @@ class Recorder:
         except OSError as error:
             if not self._failed:
                 self._failed = True
-                _log.error("%s: recording stopped: %s", self.path, error.strerror)
+                self.tell(f"recording stopped: {self.path}: {error.strerror}")
         self._job = None
 
     def _append(self, block: bytearray) -> None:

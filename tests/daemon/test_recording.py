@@ -2,11 +2,12 @@
 
 import asyncio
 import os
+import shutil
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from onboard.daemon.setup.recording import RollingRecorder
+from onboard.daemon.setup.recording import LEFT_FREE, RollingRecorder
 from onboard.errors import StateError
 from tests.daemon.daemons import until
 
@@ -80,3 +81,55 @@ async def test_a_directory_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StateError):
         RollingRecorder(tmp_path / "file" / "x", keep=1, file_bytes=1)
+
+
+class Disk:
+    """One that others have filled but for ``free`` bytes and what was recorded before."""
+
+    def __init__(self, directory, free):
+        self.directory, self.size = directory, free + self._taken(directory)
+
+    def usage(self, directory):
+        assert directory == self.directory
+        return shutil._ntuple_diskusage(self.size, 0, self.size - self._taken(directory))
+
+    @staticmethod
+    def _taken(directory):
+        return sum(path.stat().st_size for path in directory.glob("*"))
+
+
+async def test_the_oldest_make_room_and_the_journals_is_never_taken(tmp_path, monkeypatch):
+    old = [tmp_path / f"1999010{day}-000000-000.tlog" for day in (1, 2, 3)]
+    for path in old:
+        path.write_bytes(bytes(1000))
+    (tmp_path / "of somebody else").write_bytes(bytes(1000))
+    disk = Disk(tmp_path, LEFT_FREE + 500)
+    monkeypatch.setattr("shutil.disk_usage", disk.usage)
+    recorder = RollingRecorder(tmp_path, keep=100, file_bytes=10**6, wall_clock=lambda: 1e9)
+    told = []
+    recorder.tell = told.append
+    task = asyncio.create_task(recorder.run())
+
+    async def write(size):
+        for _ in range(size // (8 + len(FRAME))):
+            recorder.write(1000.0, FRAME)
+        await until(lambda: not recorder._pending)
+        await recorder._finish()
+        assert disk.usage(tmp_path).free >= LEFT_FREE
+
+    monkeypatch.setattr("onboard.mavlink.limits.FLUSH_INTERVAL_S", 0.001)
+    await write(400)
+    assert all(path.exists() for path in old)
+    await write(900)
+    assert [path.exists() for path in old] == [False, True, True]
+    await write(1900)
+    assert not any(path.exists() for path in old)
+    assert told == []
+    size = recorder.path.stat().st_size
+    await write(900)
+    assert recorder.path.stat().st_size == size, "none is left, and it ends"
+    assert len(told) == 1
+    assert "recording stopped" in told[0]
+    assert (tmp_path / "of somebody else").exists()
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)

@@ -80,6 +80,8 @@ class Parts:
         signing_file = SigningFile(directory / "signing.json")
         signing = settings.signing(configuration.link, wall_clock, signing_file.load())
         recorder = settings.recorder(configuration.recording, directory, wall_clock)
+        if recorder is not None:
+            recorder.tell = lambda text: notices.post("recording_stopped", text, warning=True)
         link = _link(configuration, signing, recorder, clock, wall_clock)
         journal = Journal(directory / "journal.jsonl")
         ledger = Ledger(journal, wall_clock)

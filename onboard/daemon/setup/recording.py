@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import re
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,11 +12,17 @@ from pathlib import Path
 from onboard.errors import StateError
 from onboard.mavlink.recorder import Recorder
 
+LEFT_FREE = 50_000_000
+"""bytes of the disk that are the journal's, the sums' and other programs': without a journal
+nothing is written to the vehicle [cost]."""
 _NAME = re.compile(r"(\d{8}-\d{6})-(\d{3,})\.tlog")
 
 
 class RollingRecorder(Recorder):
     """A recorder that goes on in a new file past ``file_bytes`` and keeps ``keep`` files.
+
+    The last of the disk's room is not taken: before that the oldest recordings go, and when this
+    one is the only one left, it ends.
 
     Files are named by the time of their start, UTC; a counter tells files of one second apart.
     Where the clock was set back, names go on counting from the newest file: by its name, not by its
@@ -46,6 +54,7 @@ class RollingRecorder(Recorder):
 
     def _append(self, block: bytearray) -> None:
         """On the recorder's thread: write, then roll over if the file has its size."""
+        self._make_room(len(block))
         super()._append(block)
         if self._file.tell() >= self._file_bytes:
             self.path = self._next_path()
@@ -53,6 +62,14 @@ class RollingRecorder(Recorder):
             self._file.close()
             self._file = following
             self._prune()
+
+    def _make_room(self, size: int) -> None:
+        while shutil.disk_usage(self._directory).free < LEFT_FREE + size:
+            older = [path for *_, path in sorted(self._ours()) if path != self.path]
+            if not older:
+                text = f"less than {LEFT_FREE // 1_000_000} MB of the disk are free"
+                raise OSError(errno.ENOSPC, text)
+            older[0].unlink(missing_ok=True)
 
     def _next_path(self) -> Path:
         stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(self._wall_clock()))
