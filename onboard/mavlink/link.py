@@ -89,7 +89,8 @@ class Link:
         """Whether the vehicle's last HEARTBEAT was signed, by whatever key."""
         self._routes = Routes()
         self._signing = signing
-        self._recorder = recorder
+        self.recorder = recorder
+        """One that is put here later is run by who does that."""
         self._clock = clock
         self._wall_clock = wall_clock
         self._audience = Audience((_HEARTBEAT, *_STAMPED))
@@ -161,15 +162,6 @@ class Link:
         if self.autopilot is not None:
             participant.start(self.autopilot.system, self.autopilot.component, self._clock())
 
-    @property
-    def recorded(self) -> bool:
-        """Whether somebody records it."""
-        return self._recorder is not None
-
-    def record(self, recorder: Recorder) -> None:
-        """Have it recorded from here on; the recorder is run by who has made it."""
-        self._recorder = recorder
-
     # Life
 
     async def run(self) -> None:
@@ -189,8 +181,8 @@ class Link:
                     for connection in self.connections
                 ]
                 tasks.append(group.create_task(self._tick_forever(), name="link tick"))
-                if self._recorder is not None:
-                    recording = self._recorder.run()
+                if self.recorder is not None:
+                    recording = self.recorder.run()
                     tasks.append(group.create_task(recording, name="link recorder"))
                 await self._stopped
                 for task in tasks:
@@ -228,7 +220,7 @@ class Link:
 
     def send(self, message: Message) -> None:
         """Send a message under our ids: to where its target was heard, else everywhere."""
-        recorder = self._recorder
+        recorder = self.recorder
         if getattr(message, "target_system", 0):
             self._wait_for_answers()
         for connection, address in self._ways_to(message):
@@ -271,7 +263,7 @@ class Link:
     def _hand_on(self, way: Way, peer: Peer, frames: list[Frame]) -> None:
         now = self._clock()
         wall = self._wall_clock()
-        recorder = self._recorder
+        recorder = self.recorder
         for frame in frames:
             if not self._is_believed((frame.system, frame.component), way, peer, frame, now):
                 continue

@@ -6,7 +6,7 @@ import pytest
 
 from onboard.errors import RefusedError, StateError
 from tests.daemon.daemons import WANTED, calibration, convinced, held_back, pushed, until
-from tests.daemon.standing_vehicle import Vehicle
+from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
 from tests.daemon.strangers import Stranger
 
 pytestmark = pytest.mark.virtual_time
@@ -162,3 +162,18 @@ async def test_on_stop_only_what_was_written_is_said_to_be_left_open(
             vehicle.parameters.clear()  # it answers nothing
             await service.rollback((1,))
         assert "left open" not in caplog.text
+
+
+async def test_where_nothing_can_be_proposed_it_is_said_why(document, daemon, port):
+    """Firmware, or a line, that does not tell which sensor it is: nothing happens for ever."""
+    parameters = {n: v for n, v in ardupilot_parameters().items() if n != "INS_ACC_ID"}
+    async with daemon(document) as service, Vehicle(port, parameters=parameters) as vehicle:
+        convinced(service, WANTED, SECOND)
+        await until(lambda: both(service) == {2})
+        first, second = (imu.state for imu in service.snapshot().imus)
+        assert (first.name, first.severity) == ("held_back", "warning")
+        assert first.sentence.endswith("not written: the autopilot has not told INS_ACC_ID")
+        assert second.name != "held_back"
+        vehicle.parameters["INS_ACC_ID"] = 2_700_001.0  # it was unlucky, and is asked again
+        await until(lambda: both(service) == {1, 2}, limit=600.0)
+        assert pushed(vehicle)

@@ -37,7 +37,7 @@ class FailureRecording:
 
     def begin(self) -> None:
         """Record from here on; a disk that takes nothing is told, and stops nothing."""
-        if self._link.recorded:
+        if self._link.recorder is not None:
             return
         try:
             recorder = RollingRecorder(
@@ -49,7 +49,7 @@ class FailureRecording:
         except OnboardError as error:
             logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
             return
-        self._link.record(recorder)
+        self._link.recorder = recorder
         self._task = asyncio.create_task(recorder.run(), name="recording of a failure")
         logger.warning("the link is recorded from here on: %s", recorder.path)
 

@@ -71,6 +71,8 @@ class Portrait:
         learned = self.parts.handover.learned
         proposals = {proposal.imu: proposal for proposal in push.proposals}
         values = self.parts.parameters.values
+        known = self.parts.proposals
+        impossible = {} if known.forbidden else known.impossible
         return tuple(
             imu_view(
                 calibration,
@@ -79,6 +81,7 @@ class Portrait:
                     writing=imu == push.active_imu,
                     written=imu in push.can_roll_back,
                     flying=condition.may_fly,
+                    impossible=impossible.get(imu, ""),
                 ),
                 values,
             )

@@ -102,6 +102,8 @@ class Proposals:
         self.doubt = ""
         """Why what was learned since the start is not to be believed, until it is reset."""
         self.current: dict[int, Proposal] = {}
+        self.impossible: dict[int, str] = {}
+        """Why nothing can be proposed for an accelerometer that has an answer."""
         self.counters: Counter[str] = Counter()
         self.writing: int | None = None
         """Accelerometer of the transaction under way: its values change by our own doing."""
@@ -128,12 +130,14 @@ class Proposals:
         self._flight, self._parameters = learned.flight, parameters
         calibrations = learned.calibrations
         plans: dict[int, PushPlan] = {}
+        self.impossible.clear()
         for imu, calibration in calibrations.items():
             try:
                 known = self._plan(calibration, parameters, system_id, board)
                 plans[imu] = self._to_write(known, calibration)
-            except PushError:
+            except PushError as error:
                 self.counters["not_proposed"] += 1
+                self.impossible[imu] = str(error)
         held = {}
         for imu, plan in plans.items():
             held[imu] = self._beyond_policy(imu, now)

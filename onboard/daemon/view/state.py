@@ -61,12 +61,16 @@ _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circumstances:
-    """What else decides: ``writing`` and ``written`` are about this accelerometer."""
+    """What else decides: ``writing`` and ``written`` are about this accelerometer.
+
+    ``impossible``: why nothing can be proposed, where there is no proposal.
+    """
 
     proposal: ProposalView | None = None
     writing: bool = False
     written: bool = False
     flying: bool = False
+    impossible: str = ""
 
 
 ALONE: Final = Circumstances()
@@ -117,6 +121,8 @@ def landing_lifts(name: str, held_back: Mapping[str, str]) -> bool:
 def _calibrated(c: Calibration, now: Circumstances) -> StateView:
     known = knowledge(c)
     further = c.coverage.advice if now.flying else ""
+    if now.proposal is None and now.impossible and not now.flying:
+        return _state("held_back", "held back", f"{known}; not written: {now.impossible}", WARNING)
     if now.proposal is None:
         return _state("calibrated", calibrated(c), known, GOOD, further)
     held = now.proposal.held_back
