@@ -174,6 +174,11 @@ class PushTransaction:
         return self._course.outcome
 
     @property
+    def purpose(self) -> Purpose:
+        """To write, or to take back."""
+        return self._course.purpose
+
+    @property
     def plan(self) -> PushPlan:
         """What it writes."""
         return self._course.plan

@@ -12,6 +12,7 @@ from tests.daemon.daemons import (
     held_back,
     in_force,
     notices,
+    push_done,
     pushed,
     until,
 )
@@ -142,3 +143,32 @@ async def test_a_person_can_roll_back_and_it_is_not_pushed_again(document, daemo
         assert in_force(vehicle) == before
         await until(lambda: "refused" in held_back(service))
         assert service.snapshot().push.can_roll_back == ()
+
+
+@pytest.mark.parametrize("how", ["reject", "reset"])
+async def test_who_rejects_in_the_middle_gets_all_old_ones_back(document, daemon, port, how):
+    document["push"]["approval"] = True
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        convinced(service, WANTED)
+        await until(lambda: service.snapshot().push.approval_needed)
+        await service.approve(())
+        await until(lambda: len(vehicle.sets) >= 2)
+        assert in_force(vehicle) != pytest.approx(before)
+        said = await getattr(service, how)(())
+        assert how == "reset" or said == "IMU 1 rejected; what was written of it is undone"
+        await until(lambda: "rolled back" in (service.snapshot().push.last_outcome or ""))
+        assert in_force(vehicle) == pytest.approx(before)
+        assert not service.snapshot().push.can_roll_back
+
+
+async def test_a_way_back_is_not_rejected(document, daemon, port):
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        before = await push_done(service, vehicle)
+        await until(lambda: service.snapshot().link.armed is False)
+        sets = len(vehicle.sets)
+        await service.rollback(())
+        await until(lambda: len(vehicle.sets) > sets)
+        assert await service.reject((1,)) == "IMU 1 rejected"
+        await until(lambda: "roll-back completed" in service.snapshot().push.last_outcome)
+        assert in_force(vehicle) == pytest.approx(before)

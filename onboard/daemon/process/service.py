@@ -267,8 +267,11 @@ class Service:
         return self.parts.proposals.approve(imus, despite_diagnosis=despite_diagnosis)
 
     async def reject(self, imus: tuple[int, ...]) -> str:
-        """Refuse the proposed push."""
-        return self.parts.proposals.reject(imus)
+        """Refuse the proposed push; one that is under way is undone."""
+        done = self.parts.proposals.reject(imus)
+        if self.parts.pusher.abandon(imus, "a person rejected it", self._clock()):
+            done += "; what was written of it is undone"
+        return done
 
     async def rollback(self, imus: tuple[int, ...]) -> str:
         """Write back what was in force before the last push."""
@@ -281,6 +284,7 @@ class Service:
             StateError: it is forgotten, but not by the disk.
         """
         del imus
+        self.parts.pusher.abandon((), "what was learned was reset", self._clock())
         try:
             await self.handover.reset()
         finally:

@@ -252,6 +252,20 @@ class Pusher:
         """Have a transaction under way undone."""
         self._ended(self._writer.tell(Cancelled(sentence), now), now)
 
+    def abandon(self, imus: tuple[int, ...], sentence: str, now: float) -> bool:
+        """A person wants none of what is being written to these (none named: whatever it is).
+
+        Returns:
+            Whether that is undone now; a way back goes on.
+        """
+        under_way = self._writer.transaction
+        if under_way is None or under_way.purpose is not Purpose.PUSH:
+            return False
+        if imus and under_way.plan.imu not in imus:
+            return False
+        self.stop(sentence, now)
+        return True
+
     def _heard_armed(self, armed: bool, now: float) -> None:  # noqa: FBT001 - what was heard
         self._ended(self._writer.tell(Heartbeat(armed), now), now)
 
