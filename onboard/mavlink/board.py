@@ -27,6 +27,8 @@ REFUSALS = (
 )
 """What ArduPilot says to a command, or a message, that it does not have."""
 _TRIES_EACH = len(limits.ANSWER_TIMEOUT_S) // len(COMMANDS)
+_ANOTHER_S = 0.5 * limits.ANSWER_TIMEOUT_S[0]
+"""s between two answers that are not one, repeated: questions are twice as far apart."""
 _STAGES = {0: "dev", 64: "alpha", 128: "beta", 192: "rc"}
 """FIRMWARE_VERSION_TYPE; 255, an official release, has no name."""
 
@@ -61,7 +63,7 @@ class Board:
         self._tries = 0
         self._next = 0.0
         self._given_up = False
-        self._other = ""
+        self._other, self._other_at = "", -math.inf
         self._again = False
         self._asked_at = -math.inf
         self._two_at = -math.inf
@@ -152,9 +154,11 @@ class Board:
     def _told(self, answer: BoardIdentity, now: float) -> None:
         known = self.uid
         if answer.uid and known and answer.uid not in {known, self._other}:
-            self._other = answer.uid
+            self._other, self._other_at = answer.uid, now
             self._again |= not self.are_two(now)  # which of them is there now?
             return
+        if self.in_doubt and answer.uid == self._other and now - self._other_at < _ANOTHER_S:
+            return  # the same one, by a line that repeats
         if self.in_doubt and answer.uid == known:
             self._two_at = now
         self.identity, self._other = answer, ""

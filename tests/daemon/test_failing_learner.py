@@ -8,8 +8,11 @@ from onboard.cli.panel import panel
 from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.failures import Failures, LearnerError
+from onboard.daemon.learning.handover import Handover
+from onboard.daemon.learning.identity import Identity
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.process.service import Service
+from onboard.daemon.view.notices import Notices
 from tests.daemon.daemons import in_force, made, notices, push_done, pushed, ticks, until
 from tests.daemon.standing_vehicle import Vehicle
 
@@ -189,3 +192,53 @@ def test_who_rests_in_flight_rests_until_it_is_armed_again():
     state = VehicleState(2.0, True, landed=None)
     assert failures.left_over([ours, flown, state]) == [ours, flown, state]
     assert not failures.stopped
+
+
+class Pupil:
+    """Fails once, and notes what it is told of who is there."""
+
+    def __init__(self, *, fails):
+        self.fails = fails
+        self.told = []
+
+    def identify(self, _there, told):
+        self.told.append({sample.name for sample in told})
+
+    def gap(self, *, rebooted=False):
+        pass
+
+    def learn(self, _samples, **_):
+        if self.fails:
+            raise BrokenError("no such thing")
+        return SimpleNamespace(news=(), diagnosing=(), flight=None)
+
+    def save(self, _saved_at):
+        pass
+
+
+async def test_a_successor_is_told_what_the_one_before_had_heard_once_and_no_other_boards():
+    there = SimpleNamespace(
+        identity=Identity(1),
+        introduced=True,
+        judging=(),
+        in_flight=False,
+        parameters={"INS_ACCOFFS_X": 0.1},
+    )
+    second = Pupil(fails=False)
+    handover = Handover(
+        Pupil(fails=True),
+        Notices(lambda: 0.0),
+        there=there,
+        clock=lambda: 0.0,
+        wall_clock=lambda: 0.0,
+        save_every_s=1e9,
+        successor=lambda: second,
+    )
+    with pytest.raises(LearnerError) as caught:
+        await handover.step()
+    handover._replace(caught.value)
+    await handover.step()
+    assert second.told == [{"INS_ACCOFFS_X"}]
+    handover.gap()  # what is remembered from here on may be of another board
+    await handover.step()
+    assert second.told == [{"INS_ACCOFFS_X"}, set()]

@@ -202,8 +202,11 @@ class Two(Vehicle):
 
 @pytest.mark.parametrize("knows", [(NEW, OLD), (OLD,)])
 @pytest.mark.parametrize("since", [0.0, 45.0])
-def test_two_boards_under_one_system_id_are_found_and_forgotten_when_one_has_gone(knows, since):
-    vehicle = Two(since=since, until=since + 90.0, knows=knows)
+@pytest.mark.parametrize("line", [{}, {"duplication": 1.0}], ids=["clean", "every packet twice"])
+def test_two_boards_under_one_system_id_are_found_and_forgotten_when_one_has_gone(
+    knows, since, line
+):
+    vehicle = Two(since=since, until=since + 90.0, knows=knows, **line)
     vehicle.run(max(since - 1.0, 0.0))
     assert not vehicle.board.are_two(vehicle.now)
     vehicle.run(2.0 * limits.BOARD_ASKED_S)

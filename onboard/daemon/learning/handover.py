@@ -243,12 +243,13 @@ class Handover:
         # The parameters before all else; a stable order: the latest report still comes last.
         self._samples.sort(key=lambda sample: type(sample) is not ParameterValue)
         told = [s for s in self._samples if type(s) is ParameterValue]
-        if self._succeeded:  # whoever came after the first one has missed what was told before
+        if self._succeeded:  # it has missed what was told to the one before
             known = self._there.parameters
             told = [*(ParameterValue(name, value) for name, value in known.items()), *told]
         gaps = self.counters["gaps"]
         await self._call(self._learner.identify, identity, told)
         self._begun = gaps == self.counters["gaps"]  # no other one while that was done
+        self._succeeded &= not self._begun
         return self._begun
 
     async def _learn(self, samples: list[Sample]) -> None:
