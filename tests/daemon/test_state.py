@@ -26,6 +26,8 @@ SENTENCES = {
     "policy_never": "the push policy is 'never': values are proposed only",
     "refused": "a person rejected it; `onboard approve 1` lifts that",
     "failed_before": "the last try failed: the next one in 17 s",
+    "step_too_large": "INS_ACCSCAL_X would step by +0.02 in flight, 0.005 allowed: land first",
+    "ekf_unhealthy": "in flight, and the EKF is not known to be healthy",
     "unheard_of": "the moon is full",
     "unconfirmed": "learned before the autopilot last started",
 }
@@ -55,6 +57,9 @@ def state(*held, approved=False, **circumstances):
         ((), "calibrated", "about to be written"),
         (("armed",), "calibrated", "calibrated"),
         (("armed", "not_diagnosed"), "calibrated", "calibrated"),
+        (("step_too_large",), "calibrated", "calibrated"),
+        (("ekf_unhealthy", "step_too_large"), "calibrated", "calibrated"),
+        (("step_too_large", "not_sure"), "held_back", "held back"),
         (("diagnosing",), "calibrated", "calibrated"),
         (("diagnosing", "not_sure"), "calibrated", "calibrated"),
         (("diagnosing", "unheard_of", "approval"), "calibrated", "calibrated"),

@@ -29,7 +29,16 @@ NAMES: Final = (
     "rejected",
 )
 """All that a state may be called."""
-AFTER_LANDING: Final = frozenset({"armed", "disarmed_too_short", "in_air", "diagnosing"})
+AFTER_LANDING: Final = frozenset(
+    {
+        "armed",
+        "disarmed_too_short",
+        "in_air",
+        "diagnosing",
+        "step_too_large",
+        "ekf_unhealthy",
+    }
+)
 """Reasons against a push that go away by themselves when the vehicle has landed."""
 WAITING: Final = frozenset({"approval", "unconfirmed"})
 """Reasons that wait for a person who looks at the values."""
