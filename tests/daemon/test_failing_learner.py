@@ -242,3 +242,18 @@ async def test_a_successor_is_told_what_the_one_before_had_heard_once_and_no_oth
     handover.gap()  # what is remembered from here on may be of another board
     await handover.step()
     assert second.told == [{"INS_ACCOFFS_X"}, set()]
+
+
+async def test_what_cannot_be_shown_ends_nothing(document, daemon, port, monkeypatch):
+    def failing(*_):
+        raise BrokenError("no such thing")
+
+    sent = []
+    async with Vehicle(port) as vehicle, daemon(document) as service:
+        monkeypatch.setattr(service._outlets.history, "take", failing)
+        monkeypatch.setattr(service._notifier, "send", lambda **fields: sent.append(fields))
+        await push_done(service, vehicle)
+        await ticks(service, 5)
+        assert len(notices(service, "not_shown")) == 1
+        assert sent[-1]["WATCHDOG"] == "1"
+        assert "cannot be shown" in sent[-1]["STATUS"]

@@ -182,11 +182,27 @@ class Service:
                 # Whether a reboot has lost what is gone, or somebody has set it, shows its clock.
                 confirmed=parts.parameters.confirmed if clock.certain(now) else (),
             )
-        if self.server is not None:
-            self.server.publish()
-        self._outlets.publish()
+        shown = self._show()
         if self.handover.keeps_up(now):
-            self._notifier.send(WATCHDOG="1", STATUS=self._portrait.sentence(self._clock()))
+            self._notifier.send(WATCHDOG="1", STATUS=shown)
+
+    def _show(self) -> str:
+        """Tell everybody outside; the line for the service manager.
+
+        A mistake of ours in what is shown is no reason to leave a vehicle alone with a push.
+        """
+        try:
+            if self.server is not None:
+                self.server.publish()
+            self._outlets.publish()
+            return self._portrait.sentence(self._clock())
+        except Exception:
+            if not self._life.counters["not_shown"]:
+                text = "the state cannot be shown; the log has the reason, the rest goes on"
+                self.notices.post("not_shown", text, warning=True)
+                logger.exception("the state cannot be shown")
+            self._life.counters["not_shown"] += 1
+            return "the state cannot be shown; see the log"
 
     def _tell_of_stalls(self, now: float) -> None:
         """In the log, now and then: nobody but a programmer can do anything about it."""
