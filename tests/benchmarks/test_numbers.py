@@ -27,7 +27,7 @@ def test_of_what_the_model_has_the_six_are_those_without_it(jumped):
 
 
 def test_of_what_it_has_not_they_are_those_that_fit_the_flight(jumped):
-    flight, _, judge = jumped
+    judge = jumped[2]
     # Another flight's effects, which act from the first sample on, on the same motion.
     always = ScaleStep(time=0.0, x=0.03, y=-0.02), BiasStep(time=0.0, z=0.4)
     other = run(FlightSpec(duration=130.0, seed=3, imus=(IMU,), effects=always))
