@@ -1,14 +1,8 @@
 """The numbers that concealed effects leave: errors of scale and offset in their claimed sigmas.
 
 Naming an effect is one thing, six numbers that are right another: wrong ones with small sigmas are
-the worst that a calibration can give out.  What is *true* is what the tool's numbers mean:
-
-* an effect on the accelerometer that the model has is counted from where the tool counts it: a
-  drift from 35 degC, a ramp from the first sample, what throttle, vibration or load make from
-  none of it; of a jump the six are those before it, and those after it are asked as well;
-* one that the model has not got is in the six, and in whatever the model has in its place: true
-  are the six that bring the force nearest to the real one, over the samples of this flight;
-* effects of attitude and receiver change no number.
+the worst that a calibration can give out.  True is what they mean
+(:mod:`benchmarks.true_numbers`).
 
 Simulated gyroscopes have the axes of their accelerometers, so that sigmas are those without what
 the stated ones of x and y offset have for a gyroscope that is askew: they would hide all else.
@@ -17,12 +11,13 @@ the stated ones of x and y offset have for a gyroscope that is askew: they would
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from benchmarks.true_numbers import true_six
 from onboard.answers.advice import advise
 from onboard.answers.answer import Answer, judged
 from onboard.core.diagnosis.evidence import Judge
@@ -30,14 +25,10 @@ from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.determined import force_moments
 from onboard.core.estimate.result import SIX_NAMES, Status
-from onboard.core.maths.accelerometer import linear_of, parameters_jacobian, parameters_of
+from onboard.core.maths.accelerometer import linear_of, parameters_jacobian
 from onboard.core.maths.arrays import Array
-from onboard.core.model.quadrature import NodeMaker
-from onboard.core.physics.effect import Effect
 from onboard.push.plan import PushPlan
-from sitl.builtin.effects import BiasRamp, BiasStep, Scene
-from sitl.builtin.effects import Effect as Concealed
-from sitl.builtin.smoothing import DT
+from sitl.builtin.effects import BiasStep
 from sitl.recording import Flight
 
 FAR: Final = 3.0
@@ -148,75 +139,6 @@ def _force(given: Answer, true: Array, plan: PushPlan | None) -> tuple[float, fl
         return float(np.sqrt((six - true) @ M @ (six - true)))
 
     return error(before), error(np.array(list(plan.wanted.values()))), plan.worth.error_after
-
-
-def true_six(judge: Judge, flight: Flight, imu: int, modelled: Collection[str]) -> Array:
-    """(6,) what scale and offset of accelerometer ``imu`` should be in the judge's model.
-
-    Args:
-        judge: whose model it is, of a flight with a board that lies as the vehicle does.
-        flight: what was flown.
-        imu: which accelerometer.
-        modelled: effects that the model has, by name.
-    """
-    sensor, spec = flight.spec.imus[imu - 1], flight.spec
-    scale, offset = np.array(sensor.scale), np.array(sensor.offset)
-    mine = [e for e in spec.effects if getattr(e, "imu", 0) in (0, imu)]
-    for ramp in (e for e in mine if isinstance(e, BiasRamp) and e.name in modelled):
-        offset = offset + ramp.sizes * judge.final.origin.t0 / scale
-    left = [e for e in mine if e.name not in modelled]
-    t, f_b, extra = _felt(flight, imu - 1, left)
-    if not np.any(extra):
-        return np.concatenate([scale, offset])
-    there = {e.name for e in mine}
-    at, columns = _columns(
-        judge, [f for f in judge.final.families if f.is_read and f.effect not in there]
-    )
-    f_b, extra = (np.column_stack([np.interp(at, t, x) for x in a.T]) for a in (f_b, extra))
-    raw = (f_b + extra) / scale + offset
-    six = np.concatenate([raw[:, :, None] * np.eye(3), np.tile(np.eye(3), (len(raw), 1, 1))], 2)
-    A = np.concatenate([six, columns], axis=2).reshape(3 * len(raw), -1)
-    # In another's model what is false may stand for nothing: the least of it then.
-    found = np.linalg.lstsq(A, f_b.reshape(-1), rcond=None)[0]
-    return parameters_of(found[:6])
-
-
-def _columns(judge: Judge, families: Sequence[Effect]) -> tuple[Array, Array]:
-    """Times (n,) of the samples that were fitted, and regressors (n, 3, k) of families."""
-    model, before = judge.engine.model, None
-    six = judge.final.solution.theta[:6]
-    times, columns = [], []
-    for batch in judge.engine.batches:
-        before = model.remembering(batch.segment, {} if before is None else before.slow)
-        nodes = NodeMaker(before, np.zeros(3), six).signals(before.t[None])
-        read = [f.acceleration(nodes) for f in families if f.available(nodes)]
-        own = [a[0] for a in read if a is not None]
-        times.append(before.t)
-        columns.append(np.concatenate([np.zeros((len(before.t), 3, 0)), *own], axis=2))
-    return np.concatenate(times), np.concatenate(columns)
-
-
-def _felt(flight: Flight, index: int, effects: Sequence[Concealed]) -> tuple[Array, Array, Array]:
-    """Times (n,) in flight, (n, 3) the true force, and what effects make of it."""
-    times, forces, extras = [], [], []
-    for piece in flight.pieces:
-        if piece.flight is None:
-            continue
-        imu, n = piece.imus[index], piece.trajectory.n
-        t: Array = piece.start + DT * np.arange(n, dtype=np.float64)
-        scene = Scene(
-            f_b=piece.trajectory.f_b,
-            elapsed=t,
-            temperature=imu.temperature,
-            level=imu.vibration,
-            trajectory=piece.trajectory,
-        )
-        added = [e.reads_too_much(scene) for e in effects]
-        extra = np.sum([a for a in added if a is not None] or [np.zeros((n, 3))], axis=0)
-        times.append(t)
-        forces.append(scene.f_b)
-        extras.append(extra)
-    return np.concatenate(times), np.vstack(forces), np.vstack(extras)
 
 
 NUMBERS_HEAD = (

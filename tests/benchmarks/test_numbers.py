@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.explaining import listened
-from benchmarks.numbers import Numbers, numbers, numbers_row, true_six
+from benchmarks.numbers import Numbers, numbers, numbers_row
+from benchmarks.true_numbers import true_six
 from onboard.core.diagnosis.procedure import examine
 from sitl.builtin.effects import BiasStep, ScaleStep
 from sitl.builtin.truth import ImuTruth
