@@ -32,6 +32,7 @@ from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.physics.finding import Finding
 from onboard.mavlink.decode import Decoder
 from sitl.recording import Flight, FlightSpec, run, sent, truth_record
@@ -258,6 +259,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     options = parser("Sealed challenge of concealed effects.", count=40, first=1000)
     chosen = options.parse_args(arguments)
+    prefer_compiled()  # as the commands do
     secrets = Challenge(chosen.first).secrets()
     secrets = secrets[: chosen.count or len(secrets)]
 
