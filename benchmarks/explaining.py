@@ -20,13 +20,22 @@ import numpy as np
 
 from benchmarks.challenge import Measured, answers, kept, named, parser, summary
 from benchmarks.concealing import LEVELS, Challenge, Secret
-from onboard.core.diagnosis.procedure import diagnose
+from benchmarks.numbers import (
+    NUMBERS_HEAD,
+    NUMBERS_LEGEND,
+    Numbers,
+    far_in_words,
+    numbers,
+    numbers_row,
+)
+from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.settings import CalibratorSettings
+from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.physics.finding import Finding
 from onboard.mavlink.decode import Decoder
-from sitl.recording import FlightSpec, fly_messages, truth_record
+from sitl.recording import Flight, FlightSpec, run, sent, truth_record
 
 TIMING = ("gps_latency", "gps_smoothing", "imu_delay")
 ONSET_S = 2.0
@@ -45,6 +54,7 @@ class Outcome:
     onset_s: tuple[float, ...] = ()
     held_out: tuple[float, float] = (float("nan"), float("nan"))
     seconds: tuple[float, float] = (0.0, 0.0)
+    numbers: tuple[Numbers, ...] = ()
     details: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -70,11 +80,13 @@ def one(secret: Secret) -> Outcome:
     truth = truth_record(spec)
     answer = json.dumps(truth, sort_keys=True)
     seal = hashlib.sha256(answer.encode()).hexdigest()[:16]
-    calibrator = heard(spec)
+    flight = run(spec)
+    calibrator = listened(flight)
     made = time.process_time() - begun
     print(f"  sealed {seal}", file=sys.stderr, flush=True)
     begun = time.process_time()
-    said = diagnose(calibrator, 1)
+    judge = examine(calibrator, 1)
+    said = judge.diagnosis()
     took = time.process_time() - begun
     return Outcome(
         secret,
@@ -86,6 +98,7 @@ def one(secret: Secret) -> Outcome:
         tuple(_onsets(truth, said, calibrator)),
         (said.mismatch.held_out_before, said.mismatch.held_out_after),
         (made, took),
+        tuple(numbers(judge, said, calibrator, flight)),
         {
             "truth": truth["effects"],
             "said": {
@@ -98,9 +111,14 @@ def one(secret: Secret) -> Outcome:
 
 def heard(spec: FlightSpec) -> Calibrator:
     """A calibrator that has listened to all of a flight."""
+    return listened(run(spec))
+
+
+def listened(flight: Flight) -> Calibrator:
+    """The same of a flight that has been flown."""
     calibrator = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0))
     decoder = Decoder()
-    for _, message in fly_messages(spec):
+    for _, message in sent(flight):
         for sample in decoder.decode(message):
             calibrator.feed(sample)
     calibrator.finish()
@@ -188,22 +206,40 @@ well.  unknowns: within 10 % or 3 sigma.  median: relative error.  onset: larges
 held-out: median fall of the error on data that was not fitted."""
 
 
-def table(outcomes: list[Outcome]) -> str:
-    """What the challenge has shown."""
-    lines = [HEAD, "|" + "---|" * (HEAD.count("|") - 1)]
+def grouped(outcomes: list[Outcome]) -> dict[str, list[Outcome]]:
+    """Recordings by what is concealed, as rows of tables."""
     singles = [o for o in outcomes if o.secret.kind == "single"]
-    lines += [
-        _row(name, [o for o in singles if o.secret.names[0] == name])
-        for name in sorted({o.secret.names[0] for o in singles})
-    ]
     groups = {
+        name: [o for o in singles if o.secret.names[0] == name]
+        for name in sorted({o.secret.names[0] for o in singles})
+    }
+    groups |= {
         "all single effects": singles,
         "pairs": [o for o in outcomes if o.secret.kind == "pair"],
         "outside the catalogue": [o for o in outcomes if o.secret.kind == "nameless"],
         "nothing": [o for o in outcomes if o.secret.kind == "control"],
     }
-    lines += [_row(label, some) for label, some in groups.items() if some]
-    return "\n".join(lines)
+    return {label: some for label, some in groups.items() if some}
+
+
+def _ruled(head: str, rows: Iterable[str]) -> str:
+    return "\n".join([head, "|" + "---|" * (head.count("|") - 1), *rows])
+
+
+def table(outcomes: list[Outcome]) -> str:
+    """What the challenge has shown."""
+    return _ruled(HEAD, (_row(label, some) for label, some in grouped(outcomes).items()))
+
+
+def numbers_table(outcomes: list[Outcome]) -> str:
+    """What the six are worth."""
+    groups = grouped(outcomes)
+    if "all single effects" in groups:
+        singles = groups["all single effects"]
+        groups |= {f"single, {x}": [o for o in singles if o.secret.level == x] for x in LEVELS}
+    groups["all"] = outcomes
+    every = {label: [n for o in some for n in o.numbers] for label, some in groups.items()}
+    return _ruled(NUMBERS_HEAD, (numbers_row(k, some) for k, some in every.items() if some))
 
 
 def describe(o: Outcome) -> str:
@@ -212,26 +248,30 @@ def describe(o: Outcome) -> str:
     said = {
         n: {k: f"{v:.4g}±{s:.2g}" for k, (v, s) in q.items()} for n, q in o.details["said"].items()
     }
-    return (
+    first = (
         f"  seed {o.secret.seed} {o.secret.vehicle} {o.secret.kind} {o.secret.level}: "
         f"hidden {hidden}, said {o.verdict} {said} {o.details['formula']} amb {o.ambiguous}"
     )
+    return "\n".join([first, *(f"    {far_in_words(n)}" for n in o.numbers if n.far)])
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     options = parser("Sealed challenge of concealed effects.", count=40, first=1000)
     chosen = options.parse_args(arguments)
+    prefer_compiled()  # as the commands do
     secrets = Challenge(chosen.first).secrets()
     secrets = secrets[: chosen.count or len(secrets)]
 
     def tell(o: Outcome) -> str:
         missed = o.secret.testable and not o.identified
-        return describe(o) if o.false or missed else ""
+        return describe(o) if o.false or missed or any(n.far for n in o.numbers) else ""
 
     outcomes = kept(answers(one, secrets, chosen.processes), tell, chosen.save)
     print(table(outcomes))
     print(LEGEND)
+    print(numbers_table(outcomes))
+    print(NUMBERS_LEGEND)
     print(summary(outcomes, "diagnose"))
 
 

@@ -137,11 +137,13 @@ def fly(spec: FlightSpec) -> list[tuple[int, bytes]]:
 
 
 def fly_messages(spec: FlightSpec) -> Iterator[tuple[int, Message]]:
-    """Flies it; (unix time in us, pymavlink message), neither packed nor parsed.
+    """Flies it; (unix time in us, pymavlink message), neither packed nor parsed."""
+    yield from sent(run(spec))
 
-    Its header tells sender and sequence, as if it had been.
-    """
-    for sequence, (unix_us, message) in enumerate(run(spec).messages):
+
+def sent(flight: Flight) -> Iterator[tuple[int, Message]]:
+    """Messages of a flight; their headers tell sender and sequence, as if they had been packed."""
+    for sequence, (unix_us, message) in enumerate(flight.messages):
         header = message.get_header()
         header.seq, header.srcSystem, header.srcComponent = sequence % 256, 1, 1
         yield unix_us, message

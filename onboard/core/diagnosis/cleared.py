@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from onboard.core.diagnosis.clipping import at_the_rail, saturation_effect
+from onboard.core.diagnosis.clipping import cut_off, saturation_effect
 from onboard.core.diagnosis.coarse_readings import coarse_of
 from onboard.core.diagnosis.effort import WORTH_S
 from onboard.core.diagnosis.examination import Examination
@@ -36,7 +36,7 @@ CUT = "the accelerometer clipped nearly all the time, which changes the force as
 class Cleared:
     """A flight without what must not be fitted, with every effect that it can be asked for.
 
-    ``clipped`` if the accelerometer was at its rail all the time, and nothing was left out;
+    ``clipped`` if the accelerometer clipped nearly all the time, and nothing was left out;
     ``sampled`` is the flight before anything was expected of its samples.
     """
 
@@ -79,10 +79,9 @@ def cleared(
         beside: another accelerometer's examination of the same flight; None: the first.
     """
     rail = saturation_effect(flight, origin.t0)
-    batches = flight
-    if rail is not None:
-        batches = _unclipped(flight, rail, origin.t0)
-    clipped = rail is not None and batches is flight
+    left = flight if rail is None else _unclipped(flight, rail, origin.t0)
+    clipped = left is None
+    batches = flight if left is None else left
     testable, absent = testable_of(catalogue(origin), batches)
     if rail is not None:
         bent = {
@@ -121,16 +120,16 @@ def cleared(
     return Cleared(full, testable, absent, rail, fault, spikes, told, clipped, sampled)
 
 
-def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch]:
-    """The flight without what was clipped at all, else without what was for long, or as it is.
+def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch] | None:
+    """The flight without what was clipped at all, else without what may matter; None: too little.
 
     What is left of it may say little, but no wrong number.
     """
-    for spans in (rail.intervals, at_the_rail(flight, t0)):
+    for spans in (rail.intervals, cut_off(flight, t0)):
         left = unclipped(flight, spans, t0) if spans else flight
-        if left is not flight and sum(batch.trusted_s for batch in left) >= WORTH_S:
+        if sum(batch.trusted_s for batch in left) >= WORTH_S:
             return left
-    return flight
+    return None
 
 
 def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.diagnosis.effort import TOGETHER_S
-from onboard.core.diagnosis.limits import FEWEST_CLIPPED, LEAST_RAIL
+from onboard.core.diagnosis.limits import FEWEST_CLIPPED, LEAST_RAIL, LONGEST_STEP_S
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.diagnosis.score import least
+from onboard.core.estimate.limits import OFFSET_FLOOR
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.spans import inside, joined
@@ -35,10 +36,29 @@ def saturation_effect(batches: Sequence[Batch], t0: float) -> Finding | None:
     return _stuck(batches, t0, counted.spans) or _often(batches, t0, counted)
 
 
-def at_the_rail(batches: Sequence[Batch], t0: float) -> tuple[tuple[float, float], ...]:
-    """When samples stay at one extreme value, s since ``t0``: what was clipped for long."""
-    found = _stuck(batches, t0, np.zeros((0, 2)))
-    return () if found is None else found.intervals
+def cut_off(batches: Sequence[Batch], t0: float) -> tuple[tuple[float, float], ...]:
+    """When clipping may have changed the force by more than any number claims, s since ``t0``.
+
+    A sample that is cut off reads too little by what vibration took over the rail, which is about
+    its level; of the mean it is one of so many.
+    """
+    counted = _counted(batches)
+    share = counted.rise * LONGEST_STEP_S / np.diff(counted.spans, axis=1)[:, 0]
+    much = counted.spans[share * _level(batches, counted.spans[:, 1]) > OFFSET_FLOOR]
+    stuck = _stuck(batches, t0, much)
+    if stuck is not None:
+        return stuck.intervals
+    return tuple((a - t0, b - t0) for a, b in joined(((a, b) for a, b in much.tolist()), 1e-3))
+
+
+def _level(batches: Sequence[Batch], t: Array) -> Array:
+    """Level of vibration (n,) at times, of the axis that shakes most, m/s^2; infinite if untold."""
+    told = [c.segment.slow["vibration"] for c in batches if "vibration" in c.segment.slow]
+    if not told:
+        return np.full(len(t), np.inf)
+    at, first = np.unique(np.concatenate([x[0] for x in told]), return_index=True)
+    level: Array = np.concatenate([x[1] for x in told])[first].max(axis=1)
+    return np.interp(t, at, level)
 
 
 @dataclass(frozen=True, slots=True)

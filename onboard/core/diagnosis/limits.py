@@ -61,6 +61,9 @@ FEWEST_CLIPPED: Final = 5
 """Clipped samples between two reports that are more than a knock [tuned]."""
 LEAST_RAIL: Final = 10.3
 """More than any accelerometer that is at rest reads, m/s^2 [physics]."""
+LONGEST_STEP_S: Final = 1e-3
+"""s between two raw samples, of which clipped ones are counted: ArduPilot's drivers read a thousand
+a second and more [data sheet]."""
 MARGIN_S: Final = 0.4
 """s to either side of clipped flight that go with it: a low-pass of 5 Hz rings so long
 [physics]."""

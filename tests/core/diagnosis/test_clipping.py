@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.clipping import at_the_rail, saturation_effect
+from onboard.core.diagnosis.clipping import cut_off, saturation_effect
 from onboard.core.diagnosis.limits import FEWEST_CLIPPED
 from onboard.core.inputs.samples import Vibration
 from onboard.core.inputs.streams import Streams
@@ -124,8 +124,24 @@ def test_where_samples_are_stuck_whatever_was_counted_goes_with_them():
     found = saturation_effect(flight, T0)
     assert found.unknowns["limit"].value == pytest.approx(LIMIT)
     assert found.intervals == (pytest.approx((20.0, 22.0)), pytest.approx((40.0, 41.0)))
-    assert at_the_rail(flight, T0) == (pytest.approx((20.2, 20.88)),)
-    assert at_the_rail(batches(flown(np.random.default_rng(9), 60.0)), T0) == ()
+    assert cut_off(batches(raw), T0) == (pytest.approx((20.2, 20.88)),)
+    assert cut_off(batches(flown(np.random.default_rng(9), 60.0)), T0) == ()
+
+
+def test_what_clips_so_seldom_that_no_number_shows_it_may_be_kept():
+    """A sample of a thousand reads too little by about the level of the vibration."""
+    raw = softened(np.random.default_rng(6), [(20.1, 20.9), (40.1, 40.9)], 30.0)
+    slow = counted({21: 3, 22: 12, 41: 400})
+
+    def cut(level):
+        shaken = slow["clipping"][0], np.full((61, 3), [0.1 * level, 0.2 * level, level])
+        return cut_off(batches(raw, slow=slow | {"vibration": shaken}), T0)
+
+    assert cut(0.002) == (), "400 of 0.002 m/s^2 in a thousand are less than a mm/s^2"
+    assert cut(0.05) == ((40.0, 41.0),)
+    assert cut(0.2) == ((21.0, 22.0), (40.0, 41.0))
+    assert cut(1.0) == ((20.0, 22.0), (40.0, 41.0))
+    assert cut_off(batches(raw, slow=slow), T0) == cut(1.0), "nobody says how much it shakes"
 
 
 @pytest.mark.parametrize("named", [True, False])

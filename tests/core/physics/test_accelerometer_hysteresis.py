@@ -24,6 +24,7 @@ from onboard.core.physics.effects.accelerometer_hysteresis import (
     AccelerometerHysteresis,
     _branches,
 )
+from onboard.core.physics.effects.throttle_coupling import ThrottleCoupling
 from onboard.core.physics.octaves import WEIGHTS
 from sitl.builtin.effects.accelerometer_hysteresis import AccelerometerHysteresis as Concealed
 
@@ -96,6 +97,25 @@ def test_without_its_size_they_are_right_to_first_order(weights):
     left = reading + taken_off(effect, made, t, weights) - f_b
     taken_back = np.max(np.sum(np.abs(weights) / PLAYS, axis=1))
     assert np.sqrt(np.mean(left**2)) < taken_back * np.sqrt(np.mean((reading - f_b) ** 2))
+
+
+def test_an_offset_that_comes_and_goes_moves_no_follower():
+    """What the throttle makes of the reading comes after the load has been felt."""
+    t, f_b = load()
+    throttle = np.interp(t, t[::300], np.random.default_rng(7).uniform(0.0, 1.0, len(t[::300])))
+    size = np.array([1.5, -1.2, 0.8])
+    told = {"throttle": (t, throttle)}
+    reading = read(f_b, SHARED) + throttle[:, None] * size
+    beside = ((ThrottleCoupling(ORIGIN), size),)
+
+    def off(effect):
+        made = Model([effect]).remembering(segment(t, reading).with_slow(told), {})
+        left = reading - throttle[:, None] * size + taken_off(effect, made, t, SHARED) - f_b
+        return np.sqrt(np.mean(left**2))
+
+    effect = AccelerometerHysteresis(ORIGIN)
+    assert off(effect.about(unknowns_of(SHARED), beside)) < 1e-6
+    assert off(effect.about(unknowns_of(SHARED))) > 0.02, "alone they ride on it"
 
 
 def test_a_loop_that_has_no_inverse_is_taken_off_in_part():

@@ -1,5 +1,7 @@
 """The law of a temperature drift: ArduPilot's three powers, and no more than a flight can tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,16 @@ def test_every_polynomial_of_ardupilots_is_one_of_them_and_the_size_is_its_mean_
     assert not made[:, 0, 2::3].any(), "an axis acts on itself alone"
 
 
+@pytest.mark.parametrize("flown", [(20.0, 50.0), (10.0, 28.0), (33.0, 70.0), (40.0, 60.0)])
+def test_at_the_reference_it_adds_nothing_to_the_offset_whatever_its_shape(flown):
+    batch = flight(20.0, 50.0)[0]
+    t = batch.segment.t[:3]
+    there = replace(batch.segment, slow={"temperature": (t, np.full(3, 35.0))})
+    curve = TemperatureDrift(ORIGIN).told_by(flight(*flown))
+    assert len(curve.unknowns) == 9
+    assert columns(curve, there, t) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_its_curve_is_drawn_with_its_shape_and_said_by_its_range():
     warm = flight(20.0, 50.0)
     curve = TemperatureDrift(ORIGIN).told_by(warm)
@@ -75,7 +87,8 @@ def test_its_curve_is_drawn_with_its_shape_and_said_by_its_range():
     bent = curve.bent(line, theta, np.diag(np.full(9, 1e-6)))
     low, high = curve.flown
     u = np.clip((2.0 * line.x - low - high) / (high - low), -1.0, 1.0)
-    assert bent.y["z"] == pytest.approx(1e-3 * (line.x - 35.0) + 0.2 * (3.0 * u**2 - 1.0))
+    about = (70.0 - low - high) / (high - low)  # where nothing is left, for the six have it
+    assert bent.y["z"] == pytest.approx(1e-3 * (line.x - 35.0) + 0.6 * (u**2 - about**2))
     assert bent.y["x"] == pytest.approx(0.0)
     assert np.all(bent.sigma["z"] > 0.0)
 
@@ -105,9 +118,12 @@ def test_warming_up_along_a_curve_is_told_as_temperature(vehicle, square, cube):
     u = curve.x - 35.0
     for j, axis in enumerate("xyz"):
         law = square[j] * u**2 + cube[j] * u**3
-        # Its level is the offset's: what is told is how it bends.
         off = (curve.y[axis] - law) - np.mean(curve.y[axis] - law)
         assert np.sqrt(np.mean(off**2)) < 0.25 * np.std(law) + 0.01
+    c = found.calibration
+    error = np.array(c.scale + c.offset) - SIX
+    chi_square = error @ np.linalg.solve(c.with_its_gyroscope, error)
+    assert chi_square < 22.5, "of the six at 35 degC: one flight in a thousand"
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.medians import NORMAL_MEDIAN
-from onboard.core.model.quadrature import Signals
+from onboard.core.model.quadrature import NodeMaker, Signals
 from onboard.core.physics.effect import AXES, Bearing, Effect, Origin
 from onboard.core.physics.octaves import WEIGHTS, sigma_of_shapes
 
@@ -23,6 +23,8 @@ narrower one is driven by what vibration leaves after the autopilot's low-pass; 
 through by few flights, and to the others it is a scale [physics]."""
 LARGEST = 1.0
 """Half the height of the largest loop that is believed, m/s^2 [assumed]."""
+AS_READ = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+"""Scale and beta of a raw force that is taken as it is."""
 SHAPES = ("narrow", "ends")
 """Names of the shapes: more of the narrow play than of the wide, more of both than in between."""
 MOST_TAKEN_BACK = 0.8
@@ -67,10 +69,15 @@ class AccelerometerHysteresis(Effect):
         shapes = [f"{shape}_{a}" for shape in SHAPES for a in AXES]
         self.take_shapes(shapes, "m/s^2", sigma_of_shapes(LARGEST))
         self.weights = np.zeros((3, len(PLAYS)))
+        self.beside: tuple[tuple[Effect, Array], ...] = ()
 
-    def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
-        """The followers of the load that is left when ``size`` (9,) is taken off what was read."""
+    def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:
+        """The followers of the load that is left when ``size`` (9,) is taken off what was read.
+
+        An offset that follows the throttle moves no follower, large as it may be to a play.
+        """
         made = copy(self)
+        made.beside = tuple(beside)
         made.weights = _invertible(size.reshape(len(WEIGHTS), 3).T @ WEIGHTS)
         return made
 
@@ -80,7 +87,15 @@ class AccelerometerHysteresis(Effect):
         Play by play of x, then of y and z.  A raw force will do: a scale is a per cent, and an
         offset moves load and followers alike.
         """
-        f_b = _averaged(segment.t, segment.raw_s @ segment.R_bs.T)
+        read = segment.raw_s @ segment.R_bs.T
+        if self.beside:
+            nodes = NodeMaker(segment, np.zeros(3), AS_READ).signals(segment.t)
+            read = read + sum(
+                added @ size
+                for other, size in self.beside
+                if (added := other.acceleration(nodes)) is not None
+            )
+        f_b = _averaged(segment.t, read)
         count = len(PLAYS)
         places = np.zeros((3, count))
         if before is not None:

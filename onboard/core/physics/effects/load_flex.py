@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.maths.frames import skew
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics import response_curves as curves
 from onboard.core.physics.effect import Bearing
 from onboard.core.physics.finding import Finding
-from onboard.core.physics.proportional import Proportional
+from onboard.core.physics.proportional import Turning
 from onboard.core.physics.wording import DEGREE, each
 
 
-class LoadFlex(Proportional):
+class LoadFlex(Turning):
     """Mount that bends with the load: tilt per g of load beyond one."""
 
     effect = "load_flex"
@@ -35,10 +34,9 @@ class LoadFlex(Proportional):
         "load factor", "g", "tilt", "°", curves.load, lambda x, _: (x - 1.0) / DEGREE
     )
 
-    def amount(self, f_b: Array) -> Array:
-        """As a tilt, times ``n - 1``."""
-        extra = -f_b[..., 2] / STANDARD_GRAVITY - 1.0
-        out: Array = skew(f_b)[..., :2] * extra[..., None, None]
+    def angle(self, f_b: Array) -> Array:
+        """``n - 1``, of the true force: one that is turned already weighs otherwise."""
+        out: Array = -f_b[..., 2] / STANDARD_GRAVITY - 1.0
         return out
 
     @classmethod

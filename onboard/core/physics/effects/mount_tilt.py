@@ -41,11 +41,10 @@ import numpy as np
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.maths.frames import skew
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import SURE, Bearing, Cure, NuisanceFit, Origin
 from onboard.core.physics.finding import Finding, Quantity
-from onboard.core.physics.proportional import Proportional
+from onboard.core.physics.proportional import Turning
 from onboard.core.physics.wording import DEGREE, each
 
 LEAST_RAD = float(np.deg2rad(1.0))
@@ -66,7 +65,7 @@ TAKE_OUT = "AHRS_TRIM was set for this tilt: take it out, the attitude in flight
 IF_LEVELLED = "if AHRS_TRIM is from levelling on the ground, it holds this tilt, too; without it:"
 
 
-class MountTilt(Proportional):
+class MountTilt(Turning):
     """Accelerometer turned against gyroscope and attitude: ``measured = exp(tilt x) true``.
 
     The unknowns are by how much the attitude is too large *for the accelerometer*: minus the angles
@@ -93,7 +92,6 @@ class MountTilt(Proportional):
         Unknown("force_tilt_roll", "rad", 0.0, 0.15),
         Unknown("force_tilt_pitch", "rad", 0.0, 0.15),
     )
-    taken_off: ClassVar[float] = 0.5
     in_every_model: ClassVar[tuple[str, ...]] = ("tilt_roll", "tilt_pitch")
 
     def __init__(self, origin: Origin) -> None:
@@ -101,10 +99,6 @@ class MountTilt(Proportional):
         super().__init__(origin)
         # Levelling takes the first accelerometer's word: no trim is another one's tilt.
         self._trim = np.array(origin.trim[:2] if origin.imu == 1 else (0.0, 0.0))
-
-    def amount(self, f_b: Array) -> Array:
-        """``f x e``: what one unit of each unknown takes off the force."""
-        return skew(f_b)[..., :2]
 
     @classmethod
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:

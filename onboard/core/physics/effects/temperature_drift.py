@@ -41,7 +41,8 @@ class TemperatureDrift(Effect):
 
     ArduPilot's correction has three powers of the temperature.  The first is the size; where a
     flight warms up enough, those above it are shapes: Legendre polynomials over the temperatures
-    that were flown, which add nothing to the straight line that fits the curve best.
+    that were flown, which add no slope to the straight line that fits the curve best, less what
+    they are at the reference.
     """
 
     effect = "temperature_drift"
@@ -109,12 +110,12 @@ class TemperatureDrift(Effect):
 
     def _powers(self, T: Array) -> list[Array]:
         """What one of each adds to an offset at temperatures of any shape, power by power."""
-        out = [T - self.origin.temperature]
+        about = self.origin.temperature
+        out = [T - about]
         if self.shaped:
-            low, high = self.flown
-            u = np.clip((2.0 * T - low - high) / (high - low), -1.0, 1.0)
-            square = u * u
-            out += [0.5 * (3.0 * square - 1.0), 0.5 * u * (5.0 * square - 3.0)]
+            # Of none of them is anything at the reference, whose offset the six have.
+            at_it = _legendre(np.array(about), self.flown)
+            out += [p - at for p, at in zip(_legendre(T, self.flown), at_it, strict=True)]
         return out[: len(self.unknowns) // len(AXES)]
 
     def bent(self, line: ResponseCurve, theta: Array, covariance: Array) -> ResponseCurve:
@@ -147,6 +148,14 @@ class TemperatureDrift(Effect):
         if not _straight(found.response_curve):
             said = f"{said} in the mean, along a curve"
         return f"{said}, flown from {low:.0f} to {high:.0f} degC"
+
+
+def _legendre(T: Array, flown: tuple[float, float]) -> tuple[Array, Array]:
+    """Second and third polynomial of temperatures of any shape; beyond those flown, as there."""
+    low, high = flown
+    u = np.clip((2.0 * T - low - high) / (high - low), -1.0, 1.0)
+    square = u * u
+    return 0.5 * (3.0 * square - 1.0), 0.5 * u * (5.0 * square - 3.0)
 
 
 def _straight(curve: ResponseCurve) -> bool:
