@@ -78,7 +78,8 @@ def said(judge: Judge) -> Said:
 def response(untouched: Judge, fix_step: float) -> Array:
     """(2, K) how the receiver weighs what is around a fix, as the untouched flight says."""
     engine = untouched.engine
-    point = engine.asked(engine.found().theta)
+    found = engine.found()
+    point = engine.asked(found.theta, found.covariance)
     return weighed(point.window, point.shapes, fix_step)
 
 

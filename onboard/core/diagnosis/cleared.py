@@ -113,7 +113,13 @@ def cleared(
         if refused is not None:
             fault, batches = None, full.batches
         full = Examination(
-            engine, testable, t0=origin.t0, batches=batches, refused=refused, carried=carried
+            engine,
+            testable,
+            t0=origin.t0,
+            batches=batches,
+            start=full,
+            refused=refused,
+            carried=carried,
         ).with_noise()
     full.let_epochs_go()
     told = None if coarse is None else coarse.finding

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
+from onboard.core.estimate.approach import worth
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.going_through import through
 from onboard.core.estimate.solution import Solution, solve
@@ -160,8 +161,8 @@ class Examination(Engine):
         for left in (2, 1, 0):
             self.once(held)
             self._seed = found = solve(self.blocks, self.model)
-            point = self.asked(self.nuisances(found))
-            settled = point.near(self.point, WORTH_A_PASS)
+            point = self.asked(self.nuisances(found), found.covariance)
+            settled = point.near(self.point, worth(found, self.model, WORTH_A_PASS))
             if not left or (settled and not blind):
                 break
             self._move(point, self.noise)
@@ -213,8 +214,11 @@ class Examination(Engine):
 
     @property
     def log_likelihood(self) -> float:
-        """Of the whole flight in the last pass, the unknowns integrated out with their prior."""
-        return self._pass.log_likelihoods()[0]
+        """Of what the receiver measured in the whole flight, in the last pass.
+
+        Of that alone, for it is the same whatever timing another examination was made about.
+        """
+        return self._pass.log_likelihood_of_fixes()
 
     def whitened(self) -> list[EpochTrace]:
         """Every epoch with all that was whitened: much, and so found in one more pass."""

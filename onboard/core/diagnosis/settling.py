@@ -73,15 +73,15 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
     """The model that was chosen, about what the sums of everything say of it."""
     model = choice.fitter.model
     fit = choice.fitter.fit(choice.free, held_out=False)
+    known = choice.fitter.covariance(fit)
     final = Examination(
         full,
         families,
         t0=full.point.skew_from,
         start=full,
-        point=full.asked(fit.theta, model),
+        point=full.asked(fit.theta, known, model),
         refused=full.refused_velocities(),
     )
-    known = choice.fitter.covariance(fit)
     theta, covariance = final.model.taken_over(model, fit.theta, known)
     return final.with_rows(final.about_point(theta), covariance)
 

@@ -18,10 +18,11 @@ from onboard.core.estimate.limits import (
 )
 from onboard.core.estimate.observability import Needs
 from onboard.core.maths.arrays import Array, vector3, vector4
+from onboard.core.maths.bounded import bounded
 from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.ekf_sensors import EkfSensors
 from onboard.core.model.gyro_scale import GyroScale
-from onboard.core.model.linearisation import SHAPES, Linearisation
+from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.nuisances import (
     AttitudeOffset,
     GpsLatency,
@@ -68,6 +69,31 @@ def calibration_model(
     )
     gone = {f.instead_of for f in more}
     return Model([*(f for f in always if f.name not in gone), *more])
+
+
+def possible(
+    point: Linearisation, model: Model, theta: Array, covariance: Array, *, shaped: bool = True
+) -> Array:
+    """The likeliest unknowns with which the linearisation stays within what is possible.
+
+    Args:
+        point: the linearisation that the estimate is about.
+        model: its model.
+        theta: (m,) estimate.
+        covariance: (m, m) of it.
+        shaped: whether shapes of a receiver's response may move.
+    """
+    low, high = np.full(model.size, -math.inf), np.full(model.size, math.inf)
+    ranges = (
+        (point.delay, *DELAY_RANGE_S),
+        (point.window**2, 0.0, LONGEST_WINDOW_S**2),
+        (point.attitude_delay, *ATTITUDE_DELAY_RANGE_S),
+        (point.heading, *HEADING_RANGE_RAD),
+        *zip(point.shapes, *(SHAPE_RANGE if shaped else 2 * (point.shapes,)), strict=True),
+    )
+    for name, (now, least, most) in zip(MOVING, ranges, strict=True):
+        low[model.index[name]], high[model.index[name]] = least - now, most - now
+    return bounded(theta, covariance, low, high)
 
 
 def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:

@@ -16,7 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.estimate.calibration_model import calibration_model, moved
+from onboard.core.estimate.approach import Approach, worth
+from onboard.core.estimate.calibration_model import calibration_model, moved, possible
 from onboard.core.estimate.dead_reckoning import KnownIntervals
 from onboard.core.estimate.going_through import Watched, through
 from onboard.core.estimate.limits import (
@@ -265,43 +266,44 @@ class Engine(Watched):
         Args:
             levels: whether noise levels are not told.
         """
-        at, ready = self.point, Preparations()
+        way, ready = Approach(self.point), Preparations()
         sample = [self.batches] if self.sample is None else self.sample
         begin, names = levels_told(self.noise, (batch for part in sample for batch in part))
         self.noise = begin if levels else self.noise
         search = NoiseSearch(names, settled=not levels, blind=self._seed is None)
-        highest, best, idle, elsewhere = -math.inf, (self.point, self.noise), 0, False
+        highest, idle, elsewhere = -math.inf, 0, False
         for turn in range(MOST_ROUNDS):
             made = self._new_pass(search.members(self.noise), ready)
             results = self._over(sample, made)
-            self._seed = solve([result.block for result in results], self.model)
+            self._seed = found = solve([result.block for result in results], self.model)
             if turn == 0:
                 self.refused_untuned = sum((Counter(r.refused) for r in results), Counter())
             likely = (likelihoods := made.log_likelihoods())[0] + log_prior(self.noise, names)
             idle = idle + 1 if likely < highest + WORTH_A_SEARCH else 0
-            if likely > highest:
-                highest, best = likely, (self.point, self.noise)
-            before, at = at, self.asked(self.nuisances(self._seed))
-            self.noise = search.better(self.noise, likelihoods, made.trades, elsewhere=elsewhere)
-            if at.near(before, STEADY) and search.settled:
-                best = at, self.noise
+            highest, held = max(highest, likely), self.noise
+            asked = self.asked(self.nuisances(found), found.covariance)
+            self.noise = search.better(held, likelihoods, made.trades, elsewhere=elsewhere)
+            if search.settled and asked.near(way.at, worth(found, self.model, STEADY)):
+                way.at = asked
                 break
             if idle >= (MOST_IDLE if search.settled else MOST_VAIN):
+                self.noise = held
                 break
-            elsewhere = not self.point.stands_for(at)
+            elsewhere = not self.point.stands_for(way.go(asked, found, self.model))
             if elsewhere:
-                self._move(at, self.noise)
+                self._move(way.at, self.noise)
                 ready = Preparations()
-        self._move(*best)
+        self._move(way.at, self.noise)
 
     def nuisances(self, found: Solution) -> Array:
         """(m,) of a solution, as the linearisation is to follow them."""
         return found.theta
 
-    def asked(self, theta: Array, model: Model | None = None) -> Linearisation:
-        """The linearisation that a solution ``theta`` (m,) of a model, of its own, asks for."""
-        point = moved(self.point, model or self.model, theta)
-        return point if self.shaped else replace(point, shapes=self.point.shapes)
+    def asked(self, theta: Array, covariance: Array, model: Model | None = None) -> Linearisation:
+        """What linearisation an estimate (m,), (m, m) of a model asks for; None: of its own."""
+        model = model or self.model
+        within = possible(self.point, model, theta, covariance, shaped=self.shaped)
+        return moved(self.point, model, within)
 
     @property
     def shaped(self) -> bool:

@@ -40,13 +40,20 @@ MOST_ROUNDS: Final = 24
 """Passes of a refinement, at the most: a search takes five to ten of them [cost]."""
 MOST_IDLE: Final = 3
 """Passes in a row, none of them worth it by :data:`WORTH_A_SEARCH`, after which timing that will
-not come to rest beside levels that stand is taken where it was likeliest [cost]."""
+not come to rest beside levels that stand is left where it is [cost]."""
 MOST_VAIN: Final = 5
 """Such passes after which levels are, too, that do not stand: of real flights, whose gates and
 tails go with the estimate, likelihood goes up and down by tens from pass to pass [cost]."""
 STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
 """Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
 worth another pass [cost]."""
+NOT_WORTH: Final = 0.2
+"""Sigmas of what moves that another linearisation is not worth a pass for: on real flights the
+move after it is up to half of one, so that it is a tenth of a sigma [probability]."""
+LEAST_OF_A_STEP: Final = 0.125
+"""Share of a step that is made however often it has turned back: three times [cost]."""
+WIDER_STEPS: Final = 1.5
+"""By how much more of a step is made after one that has not turned back [cost]."""
 NEW_SHARE: Final = 0.05
 """Share of a flight that must be new for another refinement at its end [cost]."""
 MOST_STATES: Final = 12000

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.filter.innovations import Epochs
 from onboard.core.filter.kernel import Run
@@ -59,6 +60,14 @@ class Gone(NamedTuple):
     raw: Array
     log_var: Array
     states: Array
+
+    @property
+    def of_fixes(self) -> NDArray[np.bool_]:
+        """(r,) which innovations are of velocities and heights, which come first in each epoch."""
+        many = np.diff(self.first_row)
+        place = np.arange(len(self.raw)) - np.repeat(self.first_row[:-1], many)
+        out: NDArray[np.bool_] = place < np.repeat(self.velocities + self.heights, many)
+        return out
 
     def noted(self, ready: Epochs, bias_b: Array) -> Array:
         """The filter's state after each of the epochs ``ready`` that had a velocity.

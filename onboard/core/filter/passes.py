@@ -72,6 +72,8 @@ class Pass:
         )
         self.sums = BankSums(len(bank), model.size)
         """Of all segments that are finished."""
+        self.of_fixes = BankSums(1, model.size)
+        """Those of velocities and heights alone, of member 0."""
         self.trades = np.zeros((len(bank), len(bank)))
         """(B, B) products of what each member changes the whitened innovations, and half of the
         logarithm of their variance, by from member 0's: Fisher's information of small changes."""
@@ -109,6 +111,24 @@ class Pass:
     def log_likelihoods(self) -> list[float]:
         """Log-likelihood of each member, the unknowns integrated out with their prior."""
         return self.sums.log_likelihoods(self.model.prior, self.model.prior_sigma)
+
+    def log_likelihood_of_fixes(self) -> float:
+        """Log-likelihood of velocities and heights, each beside all that was measured before it.
+
+        About another latency the recorded attitude is read at other instants, which makes it other
+        data: at 10 Hz its rounding is halved midway between two samples, and what is measured there
+        is likelier whatever is true.  The receiver's own numbers are the same about every
+        linearisation.  The unknowns are integrated out around their estimate from everything
+        (Laplace), so that models with other unknowns may be compared.
+        """
+        information = 1.0 / self.model.prior_sigma**2
+        known = self.sums.N[0] + np.diag(information)
+        prior = self.model.prior
+        theta = np.linalg.solve(known, self.sums.b[0] + information * prior)
+        off = theta - prior
+        misfit = self.of_fixes.member(0).residual(theta) + float(off @ (information * off))
+        volume = float(np.linalg.slogdet(known)[1] - np.log(information).sum())
+        return -0.5 * (float(self.of_fixes.log_det[0]) + misfit + volume)
 
     def process(self, segment: Segment, fixes: Fixes, trusted: NDArray[np.bool_]) -> PassResult:
         """Go through the epochs ``fixes``; when running, the first is the last one of before.
@@ -210,6 +230,8 @@ class Pass:
             return
         sums.add(made.y, made.h, made.log_det)
         self._compare(made.y, made.h, made.log_var)
+        k = made.velocities + made.height
+        self.of_fixes.add(made.y[:1, :k], made.h[:1, :k], made.log_var[:1, :k].sum(axis=1))
         self._note(made, result)
         if made.velocities and self.keep_states:
             result.states.append(state_row(self._state(made)))
@@ -222,6 +244,8 @@ class Pass:
         result.epochs += len(gone.epochs)
         sums.add_rows(gone.rows, gone.log_var.sum(axis=1))
         self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_var)
+        of_fixes = gone.of_fixes
+        self.of_fixes.add_rows(gone.rows[:1, of_fixes], gone.log_var[:1, of_fixes].sum(axis=1))
         with_velocity = gone.epochs[gone.velocities > 0]
         if len(with_velocity):
             self._last_velocity_t = float(ready.epochs.t[with_velocity[-1]])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.segments import Segment
-from onboard.core.maths.arrays import Array, Vector4
+from onboard.core.maths.arrays import Array, Vector4, vector3, vector4
 from onboard.core.maths.frames import rotation_from_euler
 
 SHAPES = ("mostly_newer", "mostly_older", "leaning", "lagging")
@@ -67,13 +69,35 @@ class Linearisation:
         """What has been taken in of the unknowns :data:`MOVING`."""
         return self.delay, self.window**2, self.attitude_delay, self.heading, *self.shapes
 
-    def near(self, other: Linearisation, within: tuple[float, float, float, float]) -> bool:
+    def near(self, other: Linearisation, within: Sequence[float]) -> bool:
         """Whether no unknown has moved by as much as ``within``.
 
         Shapes may have: where latency and span stay, what they make of a velocity is linear.
         """
         moves = np.abs(np.subtract(self.moving, other.moving))
         return bool(np.all(moves[: len(within)] < np.array(within)))
+
+    def towards(self, other: Linearisation, share: float) -> Linearisation:
+        """The point that lies a ``share`` of the way to another one; spans go by their squares."""
+
+        def between(a: float, b: float) -> float:
+            return a + share * (b - a)
+
+        def each(a: Sequence[float], b: Sequence[float]) -> Iterator[float]:
+            return (between(x, y) for x, y in zip(a, b, strict=True))
+
+        return replace(
+            other,
+            scale=vector3(each(self.scale, other.scale)),
+            beta=vector3(each(self.beta, other.beta)),
+            delay=between(self.delay, other.delay),
+            window=math.sqrt(between(self.window**2, other.window**2)),
+            attitude_delay=between(self.attitude_delay, other.attitude_delay),
+            heading=between(self.heading, other.heading),
+            antenna=vector3(each(self.antenna, other.antenna)),
+            skew=between(self.skew, other.skew),
+            shapes=vector4(each(self.shapes, other.shapes)),
+        )
 
     def stands_for(self, other: Linearisation) -> bool:
         """Whether unknowns about this point say where that one is: :data:`LINEAR`."""
