@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.inputs.steady_heading import STEADY_THROTTLE
 from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics import response_curves as curves
@@ -41,8 +42,9 @@ class HeadingByThrottle(Effect):
     )
 
     def attitude(self, around: Around) -> Direct:
-        """``throttle e_down``."""
-        throttle = around.now.slow("throttle")
+        """``throttle e_down``, of what was not taken out of both."""
+        steady = around.now.slow(STEADY_THROTTLE)
+        throttle = around.now.slow("throttle") if steady is None else steady
         ned = np.zeros((len(around.now.t), 3, 1))
         if throttle is not None:
             ned[:, 2, 0] = throttle
