@@ -81,7 +81,7 @@ def cleared(
     rail = saturation_effect(flight, origin.t0)
     left = flight if rail is None else _unclipped(flight, rail, origin.t0)
     clipped = left is None
-    batches = flight if left is None else left
+    batches: Sequence[Batch] = flight if left is None else left
     testable, absent = testable_of(catalogue(origin), batches)
     if rail is not None:
         bent = {
@@ -94,14 +94,9 @@ def cleared(
     carried: tuple[Family, ...] = () if coarse is None else (coarse.conversion,)
     asked = _Asked(engine, testable, origin.t0, carried, beside)
     full = _felt(asked, batches)
-    spiked = None if rail is not None else spikes_of(batches)
     spikes: Finding | None = None
-    if spiked is not None and _matter(spiked, batches, full, engine):
-        without = _felt(asked, spiked.batches)
-        better = 2.0 * (without.log_likelihood - full.log_likelihood)
-        if better > CLEARLY:
-            full, batches = without, spiked.batches
-            spikes = spikes_effect(spiked, better, origin.t0)
+    if rail is None:
+        full, batches, spikes = _without_spikes(asked, batches, full)
     sampled, batches = batches, full.batches
     fault: Finding | None = None
     if not clipped:
@@ -136,6 +131,20 @@ def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch] | N
         if sum(batch.trusted_s for batch in left) >= WORTH_S:
             return left
     return None
+
+
+def _without_spikes(
+    asked: _Asked, batches: Sequence[Batch], full: Examination
+) -> tuple[Examination, Sequence[Batch], Finding | None]:
+    """The flight without samples that its velocities know nothing of, or as it is."""
+    spiked = spikes_of(batches)
+    if spiked is None or not _matter(spiked, batches, full, asked.engine):
+        return full, batches, None
+    without = _felt(asked, spiked.batches)
+    better = 2.0 * (without.log_likelihood - full.log_likelihood)
+    if better <= CLEARLY:
+        return full, batches, None
+    return without, spiked.batches, spikes_effect(spiked, better, asked.t0)
 
 
 def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:

@@ -75,18 +75,15 @@ class Parts:
             StateError: the journal is locked or damaged.
         """
         directory = configuration.state.path()
-        notices, witness = Notices(wall_clock), Witness()
-        board, parameters = Board(), ParameterWatch()
+        notices, witness, board = Notices(wall_clock), Witness(), Board()
+        parameters, observed, traffic = ParameterWatch(), Observed(), Traffic()
         signing_file = SigningFile(directory / "signing.json")
         signing = settings.signing(configuration.link, wall_clock, signing_file.load())
-        recorder = settings.recorder(configuration.recording, directory, wall_clock)
-        if recorder is not None:
-            recorder.tell = lambda text: notices.post("recording_stopped", text, warning=True)
+        recorder = _recorder(configuration, notices, wall_clock)
         link = _link(configuration, signing, recorder, clock, wall_clock)
         journal = Journal(directory / "journal.jsonl")
         ledger = Ledger(journal, wall_clock)
         proposals = _proposals(configuration, ledger)
-        observed, traffic = Observed(), Traffic()
         pusher = Pusher(ledger, proposals, witness, notices)
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, wall_clock)
@@ -155,6 +152,16 @@ def _proposals(configuration: Configuration, ledger: Ledger) -> Proposals:
     return Proposals(
         settings.policy_settings(push), approval=push.approval, imus=push.imus, refusals=ledger
     )
+
+
+def _recorder(
+    configuration: Configuration, notices: Notices, wall_clock: Callable[[], float]
+) -> Recorder | None:
+    directory = configuration.state.path()
+    recorder = settings.recorder(configuration.recording, directory, wall_clock)
+    if recorder is not None:
+        recorder.tell = lambda text: notices.post("recording_stopped", text, warning=True)
+    return recorder
 
 
 def _handover(
