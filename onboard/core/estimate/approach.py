@@ -36,8 +36,8 @@ def worth(found: Solution, model: Model, least: Sequence[float]) -> list[float]:
         model: of which it is.
         least: moves that are never worth one.
     """
-    sigmas = _sigmas(found, model)
-    return [max(a, NOT_WORTH * float(b)) for a, b in zip(least, sigmas, strict=False)]
+    sigmas = _sigmas(found, model)[: len(least)].tolist()
+    return [max(a, NOT_WORTH * b) for a, b in zip(least, sigmas, strict=True)]
 
 
 class Approach:
