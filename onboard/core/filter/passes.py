@@ -206,7 +206,7 @@ class Pass:
         while k < len(ends):
             begun = False
             if ordinary is not None and self.filter.calm:
-                gone = ordinary.go(k, self.theta, self._until_solved)
+                gone = ordinary.go(k, self.theta, self.uncertainty, self._until_solved)
                 self._note_all(gone, ready, result, sums)
                 k, begun = gone.step, gone.pending
                 if not begun:
