@@ -62,11 +62,12 @@ def _sum(
     """Variances (B, n) and what an epoch (n,) adds to them, as ``Variances.of_reading``."""
     out = np.empty(white.shape)
     for b in range(len(white)):
+        as_stated = stated ** powers[b, 0]
         for i in range(len(more)):
             out[b, i] = white[b, i]
             if i < 3:
                 least = min(out[b, i], LEAST_VELOCITY_VAR)
-                out[b, i] = max(out[b, i] * stated ** powers[b, 0], least)
+                out[b, i] = max(out[b, i] * as_stated, least)
             out[b, i] += more[i] + jitter[b] * moving[i]
     return out
 
