@@ -292,7 +292,7 @@ class Engine(Watched):
             elsewhere = not self.point.stands_for(way.go(asked, found, self.model))
             if elsewhere:
                 self._move(way.at, self.noise)
-                ready = Preparations()
+                ready = ready.elsewhere()
         self._move(way.at, self.noise)
 
     def nuisances(self, found: Solution) -> Array:

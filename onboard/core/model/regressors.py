@@ -287,7 +287,7 @@ class Model:
         m, K, epochs = self.size, len(intervals.duration), len(around.now.t)
         gained, body = np.zeros((K, 9, m + 1)), np.zeros((epochs, 9, m + 1))
         ned, along = np.zeros((epochs, 9, m)), np.zeros((epochs, m))
-        of, acting = intervals.of_sensors(), np.zeros(m, dtype=np.bool_)
+        of = intervals.of_sensors()
         averaged: list[tuple[slice, Array]] = []
         for family in self.families:
             if not family.available(around.now):
@@ -308,12 +308,12 @@ class Model:
                     body[:, first : first + 3, columns] += d.body
                 if d.ned is not None:
                     ned[:, first : first + 3, s] = d.ned
-                    acting[s] |= d.ned.any(axis=(0, 1))
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
         if averaged and around.spread is not None:
             _averaged(averaged, around.spread, body)
-        return SegmentRegressors(gained, body, ned, along, of, np.flatnonzero(acting))
+        acting = np.flatnonzero((ned != 0.0).any(axis=(0, 1)))
+        return SegmentRegressors(gained, body, ned, along, of, acting)
 
 
 def _averaged(parts: Sequence[tuple[slice, Array]], spread: Spread, body: Array) -> None:
