@@ -102,22 +102,22 @@ def cleared(
     fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
-        fault = false_fixes(calibrator, engine, full, origin.t0)
+        fault, sure = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         doubted = doubted_of(calibrator, full)
-        told = fault_or_jump(full, fault, origin.t0, doubted)
-        refused = told if isinstance(told, Refused) else None
-        fault = None if isinstance(told, Refused) else told
-        batches = full.batches if fault is None else unbelieved(full, fault, origin.t0)
-        full = Examination(
-            engine,
-            testable,
-            t0=origin.t0,
-            batches=batches,
-            start=full,
-            refused=refused,
-            carried=carried,
-        ).with_noise()
+        told = fault_or_jump(full, fault, origin.t0, doubted, sure=sure)
+        fault = told if isinstance(told, Finding) else None
+        if told is not None:
+            batches = full.batches if fault is None else unbelieved(full, fault, origin.t0)
+            full = Examination(
+                engine,
+                testable,
+                t0=origin.t0,
+                batches=batches,
+                start=full,
+                refused=told if isinstance(told, Refused) else None,
+                carried=carried,
+            ).with_noise()
     full.let_epochs_go()
     said = None if coarse is None else coarse.finding
     return Cleared(full, testable, absent, rail, fault, spikes, said, clipped, sampled)
@@ -185,10 +185,11 @@ class _Asked:
         Else from those of the accelerometer beside it: it has flown the same flight with the same
         receiver, and a search takes a third of the passes from there.  Else from where they are
         likeliest with nothing but scale, offset and timing: with every effect at once, a search
-        that knows nothing yet is led away by what effects make up for, and does not come back.
+        that knows nothing yet is led away by what effects make up for, and does not come back.  Nor
+        does one that begins where a heading seems as bad as none: what made it so may be among them.
         """
-        if start is None and self.beside is None:
-            start = self.plain(batches)
+        plain = self.plain(batches) if start is None and self.beside is None else None
+        start = start or plain
         made = Examination(
             self.engine,
             self.testable,
@@ -197,6 +198,8 @@ class _Asked:
             start=start,
             carried=self.carried,
         )
+        if plain is not None:
+            made.noise = plain.noise.with_a_heading
         if start is None and self.beside is not None:
             made.begin_as(self.beside)
         return made.with_noise()

@@ -76,10 +76,10 @@ class AsFault:
     def errors(self) -> list[tuple[int, Array, float]]:
         """Those that are no chance: which, north and east (2,), m/s, and sigma of the size.
 
-        One is looked for at every second of the flight.
+        One may begin and end at any second of the flight.
         """
         found, out = self.one.found(), []
-        places = self.full.trusted_s / MEAN_S
+        places = max(0.5 * (self.full.trusted_s / MEAN_S) ** 2, 1.0)
         for k, family in enumerate(self.families):
             index = self.one.indices(family)
             off, C = found.theta[index], found.covariance[np.ix_(index, index)]

@@ -13,17 +13,23 @@ from collections.abc import Sequence
 
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.false_velocity import as_fault, heard, sized
+from onboard.core.diagnosis.false_velocity import AsFault, as_fault, heard, sized
 from onboard.core.diagnosis.jumps import jump_near, reach_of_blocks
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.refusals import Refused as Doubted
 from onboard.core.filter.refused import Refused
+from onboard.core.inputs.segments import Batch
 from onboard.core.physics.finding import Finding
 
 
 def fault_or_jump(
-    full: Examination, fault: Finding, t0: float, doubted: Sequence[Doubted] = ()
-) -> Finding | Refused:
+    full: Examination,
+    fault: Finding,
+    t0: float,
+    doubted: Sequence[Doubted] = (),
+    *,
+    sure: bool,
+) -> Finding | Refused | None:
     """A fault, or what is still refused if the accelerometer has jumped where it seems to begin.
 
     Args:
@@ -31,13 +37,17 @@ def fault_or_jump(
         fault: velocities that seem to be false.
         t0: s on the boot clock, from which its intervals count.
         doubted: where others doubted a receiver that had a fix.
+        sure: whether there is something that gates alone do not keep out; else the flight must be
+            clearly likelier with the fault.
 
     Returns:
         The fault with its size; refused velocities, if a jump instead of it is clearly likelier,
-        and a fault beside the jump is not.
+        and a fault beside the jump is not; None if there need be neither.
     """
     batches = heard(full.batches, doubted)
     made = as_fault(full, fault.intervals, t0, batches)
+    if not sure and not _needed(full, made, batches):
+        return None
     start = fault.intervals[0][0] + t0
     if start >= settled_from(full.blocks):
         jump = full.beside((jump_near(full, (), start, reach_of_blocks(full)),), batches=batches)
@@ -46,9 +56,16 @@ def fault_or_jump(
         if _clearly(jump.log_likelihood, made.log_likelihood):
             both = as_fault(jump, fault.intervals, t0, batches)
             if not _clearly(both.log_likelihood, jump.log_likelihood):
-                return jump.refused_velocities()
+                return jump.refused_velocities() if sure else None
             made = both
     return sized(fault, made, t0)
+
+
+def _needed(full: Examination, made: AsFault, batches: Sequence[Batch]) -> bool:
+    """Whether errors of the receiver explain what gates alone do not, and are no chance."""
+    without = full.beside((), batches=batches).with_rows()
+    without.let_epochs_go()
+    return bool(made.errors()) and _clearly(made.one.log_likelihood, without.log_likelihood)
 
 
 def _clearly(more: float, less: float) -> bool:

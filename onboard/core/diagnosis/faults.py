@@ -68,6 +68,29 @@ def fault_effect(
     return fault_of(batches, t0, intervals, off, _earth_axis(s.off for s in spells))
 
 
+def suspected(traces: Traces, t0: float) -> list[tuple[float, float]]:
+    """From where to where a receiver may have been off by less than no honest one is, s.
+
+    A filter is used to a small error after a few fixes.  What speaks for one is that it is taken
+    back: refused velocities at both ends that are off to opposite sides.
+
+    Args:
+        traces: of every epoch, with innovations as the flight was found to be.
+        t0: s on the boot clock.
+    """
+    refused = {float(traces.t[i]): by[:2] for i, by in traces.refused_by.items()}
+    seen = {**_heard_beside(traces), **refused}
+    left = [_spell(run, seen, t0, 0.0, np.inf) for run in _runs(traces, refused)]
+    out: list[tuple[float, float]] = []
+    while left:
+        first = left.pop(0)
+        back = next((k for k, s in enumerate(left) if _undoes(s.onset, first.off)), None)
+        if back is not None and left[back].start - first.end < LONGEST_FAULT_S:
+            out.append((first.start, left[back].start))
+            left = left[back + 1 :]
+    return out
+
+
 def fault_of(
     batches: Sequence[Batch],
     t0: float,

@@ -15,7 +15,7 @@ import numpy as np
 from onboard.core.diagnosis.coasting import Contradiction, contradictions
 from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.faults import fault_effect, within
+from onboard.core.diagnosis.faults import fault_effect, fault_of, suspected, within
 from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
 from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused
 from onboard.core.estimate.calibrator import Calibrator
@@ -79,8 +79,11 @@ def doubted_of(calibrator: Calibrator, full: Examination) -> list[Refused]:
 
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
-) -> Finding | None:
-    """GPS velocities that cannot be true.
+) -> tuple[Finding | None, bool]:
+    """GPS velocities that cannot be true, or may not be.
+
+    Returns:
+        A fault, if there may be one; and whether there is, whatever the likelihood of the flight.
 
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
@@ -91,10 +94,11 @@ def false_fixes(
     every = (full.refused, full.refused_untuned, like.refused)
     rejected = any(refused["velocity"] for refused in every)
     if not rejected and not jumped and not doubted:
-        return None
+        return None, False
     contradicted = contradictions(full, levels, doubted)
-    return fault_effect(
-        _asked_again(full, levels, contradicted, again=bool(doubted)),
+    traces = _asked_again(full, levels, contradicted, again=bool(doubted))
+    fault = fault_effect(
+        traces,
         full.batches,
         t0,
         least,
@@ -102,6 +106,10 @@ def false_fixes(
         _distrusted(calibrator, full, t0),
         contradicted,
     )
+    if fault is not None:
+        return fault, True
+    spans = suspected(traces, t0)
+    return (fault_of(full.batches, t0, spans, None, "") if spans else None), False
 
 
 def unbelieved(full: Examination, fault: Finding, t0: float) -> list[Batch]:

@@ -10,6 +10,7 @@ the residuals (:mod:`onboard.core.estimate.solution`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -95,6 +96,28 @@ class NoiseLevels:
             for name in ESTIMATED
             if name not in NO_VARIANCES and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
         )
+
+    def mean_heading_variance(self, lasts: float) -> float:
+        """Of the slow error of the heading, its mean over so many seconds, rad^2.
+
+        Errors that are forgotten exponentially (Priestley 1981, 5.3).
+        """
+        times = lasts / self.heading_time
+        if times <= 0.0:
+            return self.heading**2
+        return self.heading**2 * 2.0 * (times + math.expm1(-times)) / times**2
+
+    @property
+    def with_a_heading(self) -> NoiseLevels:
+        """The same; a heading that is as bad as none is the usual one again, to be found anew.
+
+        At its highest it is no noise but says that something else is wrong.  If that is a heading
+        that is wrong all the time, no search finds it from there: the number that it is has a prior
+        in every model, and the slow error that stands in for it has room for anything.
+        """
+        if "heading" not in self.at_highest:
+            return self
+        return replace(self, heading=USUAL.heading, heading_time=USUAL.heading_time)
 
 
 USUAL = NoiseLevels(stated=0.5, stated_colour=0.5)
