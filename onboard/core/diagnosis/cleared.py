@@ -185,8 +185,8 @@ class _Asked:
         Else from those of the accelerometer beside it: it has flown the same flight with the same
         receiver, and a search takes a third of the passes from there.  Else from where they are
         likeliest with nothing but scale, offset and timing: with every effect at once, a search
-        that knows nothing yet is led away by what effects make up for, and does not come back.  Nor
-        does one that begins where a heading seems as bad as none: what made it so may be among them.
+        that knows nothing yet is led away by what effects make up for, and does not come back.  A
+        heading that seemed worse than usual may have been one of them, though.
         """
         plain = self.plain(batches) if start is None and self.beside is None else None
         start = start or plain
@@ -199,7 +199,7 @@ class _Asked:
             carried=self.carried,
         )
         if plain is not None:
-            made.noise = plain.noise.with_a_heading
+            made.noise = plain.noise.with_usual_heading
         if start is None and self.beside is not None:
             made.begin_as(self.beside)
         return made.with_noise()

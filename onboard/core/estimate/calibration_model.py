@@ -85,7 +85,7 @@ def possible(
         point: the linearisation that the estimate is about.
         model: its model.
         estimate: (m,) unknowns, and (m, m) covariance.
-        wanders: variance of the mean of what the heading is off by for a while, rad^2.
+        wanders: variance of what the heading is off by for a while, rad^2.
         shaped: whether shapes of a receiver's response may move.
     """
     low, high = np.full(model.size, -math.inf), np.full(model.size, math.inf)
@@ -98,28 +98,30 @@ def possible(
     )
     for name, (now, least, most) in zip(MOVING, ranges, strict=True):
         low[model.index[name]], high[model.index[name]] = least - now, most - now
-    theta = _with_all_of_the_heading(point, model, estimate[0], wanders)
+    theta = _with_all_of_the_heading(point, model, estimate, wanders)
     return bounded(theta, estimate[1], low, high)
 
 
 def _with_all_of_the_heading(
-    point: Linearisation, model: Model, theta: Array, variance: float
+    point: Linearisation, model: Model, estimate: tuple[Array, Array], wanders: float
 ) -> Array:
     """Unknowns with all that the heading is off by in the mean, which is where it is linear.
 
-    A heading that is wrong all the time and the mean of one that wanders enter alike, and share
-    what a flight shows as their variances are: the number gets little of it beside a level that has
-    room for anything.
+    A heading that is wrong all the time and one that is for a while enter alike, and share what a
+    flight shows as their variances are: the number gets little of it beside a level that has room
+    for anything.  What wanders counts as one error for as long as it is seen, and as no more than
+    what the number is unsure by without its prior.
 
     Args:
         point: the linearisation that the estimate is about.
         model: its model.
-        theta: (m,) estimate.
-        variance: of the mean of what wanders, rad^2.
+        estimate: (m,) unknowns, and (m, m) covariance.
+        wanders: variance of what wanders, rad^2.
     """
-    i, out = model.index["heading"], theta.copy()
-    off = point.heading + theta[i]
-    out[i] += off * variance / model.prior_sigma[i] ** 2
+    i, out = model.index["heading"], estimate[0].copy()
+    prior, known = model.prior_sigma[i] ** 2, 1.0 / estimate[1][i, i]
+    seen = max(known - 1.0 / prior, 0.0)
+    out[i] += (point.heading + out[i]) * min(wanders, 1.0 / seen if seen else wanders) / prior
     return out
 
 

@@ -10,7 +10,6 @@ the residuals (:mod:`onboard.core.estimate.solution`).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -97,25 +96,14 @@ class NoiseLevels:
             if name not in NO_VARIANCES and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
         )
 
-    def mean_heading_variance(self, lasts: float) -> float:
-        """Of the slow error of the heading, its mean over so many seconds, rad^2.
-
-        Errors that are forgotten exponentially (Priestley 1981, 5.3).
-        """
-        times = lasts / self.heading_time
-        if times <= 0.0:
-            return self.heading**2
-        return self.heading**2 * 2.0 * (times + math.expm1(-times)) / times**2
-
     @property
-    def with_a_heading(self) -> NoiseLevels:
-        """The same; a heading that is as bad as none is the usual one again, to be found anew.
+    def with_usual_heading(self) -> NoiseLevels:
+        """The same with a heading that is as good as usual, if it seems worse: to be found anew.
 
-        At its highest it is no noise but says that something else is wrong.  If that is a heading
-        that is wrong all the time, no search finds it from there: the number that it is has a prior
-        in every model, and the slow error that stands in for it has room for anything.
+        What makes a heading seem worse may be that it is wrong all the time.  No search finds that
+        from a level that has room for it: the number that it is has a prior in every model.
         """
-        if "heading" not in self.at_highest:
+        if self.heading <= USUAL.heading:
             return self
         return replace(self, heading=USUAL.heading, heading_time=USUAL.heading_time)
 

@@ -73,6 +73,20 @@ def test_an_error_that_the_filter_gets_used_to_is_the_receivers(vehicle, north, 
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("vehicle", "seed"), [("copter", 4721), ("plane", 4722)])
+def test_a_small_error_that_is_taken_back_is_told_by_its_likelihood(vehicle, seed):
+    """No more than an ordinary receiver's; the filter is used to it after a second."""
+    fault = concealed.GpsFault(start=60.0, end=74.0, north=-0.5, east=0.47)
+    said, first = told(vehicle, seed, fault)
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    ((begin, end),) = effect.intervals
+    assert (begin + first, end + first) == pytest.approx((fault.start, fault.end), abs=1.0)
+    offset = effect.unknowns["offset"]
+    assert offset.value == pytest.approx(np.hypot(0.5, 0.47), abs=3.0 * offset.sigma)
+
+
+@pytest.mark.slow
 def test_what_comes_after_a_long_fault_is_not_its_size():
     """The EKF goes on complaining when the receiver is right again, as one does that was lost."""
     fault = concealed.GpsFault(start=60.0, end=110.0, north=-0.4, east=-2.4)
