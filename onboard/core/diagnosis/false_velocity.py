@@ -107,6 +107,8 @@ def as_fault(
     anything.let_epochs_go()
     families = tuple(FalseVelocity(a + t0, b + t0) for a, b in intervals)
     one = full.beside(families, batches=batches).with_rows()
+    # Where an error begins and ends tells most of it, and is in the tails of what expects none.
+    one.with_rows(one.found().theta, one.found().covariance)
     one.let_epochs_go()
     return AsFault(full, batches, anything, one, families)
 

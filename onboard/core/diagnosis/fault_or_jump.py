@@ -3,8 +3,8 @@
 After a jump of its offset, dead reckoning runs away from a receiver that is right, and a gate
 refuses one velocity after the other.  So both are tried on the same measurements, and both at once:
 each refused one may be anything at all, or all of them are off by one error; a jump has three
-unknowns.  If it was a jump, velocities that others have refused in flight are true: they are asked,
-too.
+unknowns.  If it was a jump, velocities that others have refused in flight are true: whether there
+is a fault beside it is asked of them, too.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.refusals import Refused as Doubted
 from onboard.core.filter.refused import Refused
 from onboard.core.inputs.segments import Batch
+from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.finding import Finding
 
 
@@ -44,26 +45,33 @@ def fault_or_jump(
         The fault with its size; refused velocities, if a jump instead of it is clearly likelier,
         and a fault beside the jump is not; None if there need be neither.
     """
-    batches = heard(full.batches, doubted)
-    made = as_fault(full, fault.intervals, t0, batches)
-    if not sure and not _needed(full, made, batches):
+    made = as_fault(full, fault.intervals, t0, full.batches)
+    if not sure and not _needed(full, made):
         return None
+    every = heard(full.batches, doubted)
     start = fault.intervals[0][0] + t0
     if start >= settled_from(full.blocks):
-        jump = full.beside((jump_near(full, (), start, reach_of_blocks(full)),), batches=batches)
-        jump.with_rows()
-        jump.let_epochs_go()
-        if _clearly(jump.log_likelihood, made.log_likelihood):
-            both = as_fault(jump, fault.intervals, t0, batches)
-            if not _clearly(both.log_likelihood, jump.log_likelihood):
-                return jump.refused_velocities() if sure else None
-            made = both
-    return sized(fault, made, t0)
+        jump = jump_near(full, (), start, reach_of_blocks(full))
+        alone = _jumped(full, jump, full.batches)
+        if _clearly(alone.log_likelihood, made.log_likelihood):
+            asked = _jumped(full, jump, every) if doubted else alone
+            made = as_fault(asked, fault.intervals, t0, every)
+            if not _clearly(made.log_likelihood, asked.log_likelihood):
+                return alone.refused_velocities() if sure else None
+            return sized(fault, made, t0)
+    return sized(fault, as_fault(full, fault.intervals, t0, every) if doubted else made, t0)
 
 
-def _needed(full: Examination, made: AsFault, batches: Sequence[Batch]) -> bool:
+def _jumped(full: Examination, jump: BiasStep, batches: Sequence[Batch]) -> Examination:
+    """The flight with a jump."""
+    made = full.beside((jump,), batches=batches).with_rows()
+    made.let_epochs_go()
+    return made
+
+
+def _needed(full: Examination, made: AsFault) -> bool:
     """Whether errors of the receiver explain what gates alone do not, and are no chance."""
-    without = full.beside((), batches=batches).with_rows()
+    without = full.beside(()).with_rows()
     without.let_epochs_go()
     return bool(made.errors()) and _clearly(made.one.log_likelihood, without.log_likelihood)
 
