@@ -198,8 +198,9 @@ class _Asked:
             start=start,
             carried=self.carried,
         )
-        if plain is not None:
-            made.noise = plain.noise.with_usual_heading
+        if plain is not None and plain.noise != (usual := plain.noise.with_usual_heading):
+            made.noise = usual
+            made.with_rows()  # what it is linear about would pass for noise
         if start is None and self.beside is not None:
             made.begin_as(self.beside)
         return made.with_noise()

@@ -85,7 +85,7 @@ def possible(
         point: the linearisation that the estimate is about.
         model: its model.
         estimate: (m,) unknowns, and (m, m) covariance.
-        wanders: variance of what the heading is off by for a while, rad^2.
+        wanders: variance of the mean of what the heading is off by for a while, rad^2.
         shaped: whether shapes of a receiver's response may move.
     """
     low, high = np.full(model.size, -math.inf), np.full(model.size, math.inf)
@@ -109,19 +109,22 @@ def _with_all_of_the_heading(
 
     A heading that is wrong all the time and one that is for a while enter alike, and share what a
     flight shows as their variances are: the number gets little of it beside a level that has room
-    for anything.  What wanders counts as one error for as long as it is seen, and as no more than
-    what the number is unsure by without its prior.
+    for anything.  Both together are off by no more than the number may be, beforehand: a level is
+    room that a search has made, and where a flight does not tell a heading it is no reason to go
+    anywhere.
 
     Args:
         point: the linearisation that the estimate is about.
         model: its model.
         estimate: (m,) unknowns, and (m, m) covariance.
-        wanders: variance of what wanders, rad^2.
+        wanders: variance of the mean of what wanders, rad^2.
     """
     i, out = model.index["heading"], estimate[0].copy()
     prior, known = model.prior_sigma[i] ** 2, 1.0 / estimate[1][i, i]
-    seen = max(known - 1.0 / prior, 0.0)
-    out[i] += (point.heading + out[i]) * min(wanders, 1.0 / seen if seen else wanders) / prior
+    seen = known - 1.0 / prior  # of the number, all else unknown, without its prior
+    if seen > 0.0:
+        noise = max(1.0 / seen - wanders, 0.0)
+        out[i] += (point.heading + out[i]) * wanders / (prior + noise)
     return out
 
 

@@ -302,7 +302,8 @@ class Engine(Watched):
     def asked(self, theta: Array, covariance: Array, model: Model | None = None) -> Linearisation:
         """What linearisation an estimate (m,), (m, m) of a model asks for; None: of its own."""
         model = model or self.model
-        wanders, estimate = self.noise.heading**2, (theta, covariance)
+        wanders = self.noise.mean_heading_variance(self.trusted_s)
+        estimate = theta, covariance
         within = possible(self.point, model, estimate, wanders, shaped=self.shaped)
         return moved(self.point, model, within)
 

@@ -10,6 +10,7 @@ the residuals (:mod:`onboard.core.estimate.solution`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
@@ -95,6 +96,16 @@ class NoiseLevels:
             for name in ESTIMATED
             if name not in NO_VARIANCES and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
         )
+
+    def mean_heading_variance(self, lasts: float) -> float:
+        """Of the slow error of the heading, its mean over so many seconds, rad^2.
+
+        Errors that are forgotten exponentially (Priestley 1981, 5.3).
+        """
+        times = lasts / self.heading_time
+        if times <= 0.0:
+            return self.heading**2
+        return self.heading**2 * 2.0 * (times + math.expm1(-times)) / times**2
 
     @property
     def with_usual_heading(self) -> NoiseLevels:

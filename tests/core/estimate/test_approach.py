@@ -57,16 +57,26 @@ def test_a_pass_is_worth_a_share_of_what_is_known_and_never_less_than_is_told(kn
     assert worth(found, model, (9.0, 8.0, 7.0)) == [9.0, 8.0, 7.0]
 
 
+@pytest.mark.parametrize("noise", [0.03, 0.3])
 @pytest.mark.parametrize("wanders", [1e-4, 0.02, 0.5])
-def test_the_heading_goes_to_all_that_is_seen_of_it_whatever_share_the_number_has(wanders):
-    """Number and mean of what wanders, both unknown beside noisy measurements of their sum."""
+def test_the_heading_goes_to_all_that_is_seen_of_it_whatever_share_the_number_has(wanders, noise):
+    """Number and mean of what wanders beside noisy measurements of their sum.
+
+    The sum is estimated as if it had the number's prior, however much room a level has.
+    """
     model = calibration_model(Linearisation())
-    i, truth, noise = model.index["heading"], 0.26, 0.03
+    i, truth = model.index["heading"], 0.26
     prior = model.prior_sigma[i] ** 2
     both = np.linalg.inv(np.diag([1.0 / prior, 1.0 / wanders]) + np.ones((2, 2)) / noise**2)
-    number, mean = both @ np.ones(2) * truth / noise**2
+    number, _ = both @ np.ones(2) * truth / noise**2
     theta, covariance = model.prior.copy(), np.diag(model.prior_sigma**2)
     theta[i], covariance[i, i] = number, both[0, 0]
     seen = possible(Linearisation(), model, (theta, covariance), wanders)
-    assert seen[i] == pytest.approx(number + mean)
+    assert seen[i] == pytest.approx(truth * prior / (prior + noise**2))
     assert np.array_equal(np.delete(seen, i), np.delete(theta, i))
+
+
+def test_a_heading_that_a_flight_does_not_tell_stays_where_it_is():
+    model = calibration_model(Linearisation())
+    nothing = model.prior.copy(), np.diag(model.prior_sigma**2)
+    assert np.array_equal(possible(Linearisation(), model, nothing, 0.36), nothing[0])

@@ -200,6 +200,15 @@ def test_what_the_heading_has_beyond_its_floor_lasts_as_long_as_was_found(found)
     assert levels.as_seen.heading_time == pytest.approx(found, rel=0.02)
 
 
+@pytest.mark.parametrize("lasts", [0.02, 3.0, 40.0, 3000.0])
+def test_the_mean_of_an_error_that_is_forgotten_varies_as_its_correlation_says(lasts):
+    levels = replace(USUAL, heading=0.3, heading_time=20.0)
+    apart = (np.arange(200_000) + 0.5) / 200_000
+    expected = 0.3**2 * 2.0 * float(((1.0 - apart) * np.exp(-apart * lasts / 20.0)).mean())
+    assert levels.mean_heading_variance(lasts) == pytest.approx(expected, rel=1e-3)
+    assert levels.mean_heading_variance(0.0) == pytest.approx(0.3**2)
+
+
 def test_a_heading_that_seems_worse_than_usual_is_found_anew():
     assert USUAL.with_usual_heading == USUAL
     quiet = replace(USUAL, heading=0.8 * USUAL.heading, heading_time=40.0)
