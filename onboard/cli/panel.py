@@ -73,8 +73,9 @@ def gps(snapshot: Snapshot) -> Text:
     text = Text("GPS ", style="bold")
     if trust.open:
         text.append("trusted", style="green")
+    elif not (reasons := trust.reasons or ((trust.reason,) if trust.reason else ())):
+        text.append("not judged yet")
     else:
-        reasons = trust.reasons or (trust.reason or "waiting",)
         why = ", ".join(DISTRUST.get(reason, reason) for reason in reasons)
         text.append(f"not trusted: {why}", style="yellow")
     return text.append(f"; {duration(trust.trusted_s)} used so far", style="default")

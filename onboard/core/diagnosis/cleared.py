@@ -12,14 +12,15 @@ from onboard.core.diagnosis.coarse_readings import coarse_of
 from onboard.core.diagnosis.effort import WORTH_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
-from onboard.core.diagnosis.fault_or_jump import refused_beside_a_jump
+from onboard.core.diagnosis.fault_or_jump import fault_or_jump
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
-from onboard.core.diagnosis.screening import doubted_of, false_fixes, unclipped
+from onboard.core.diagnosis.screening import doubted_of, false_fixes, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.refused import Refused
 from onboard.core.inputs.expected_force import drowned, expected, spectrum, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
@@ -101,24 +102,25 @@ def cleared(
     fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
-        fault, batches = false_fixes(calibrator, engine, full, origin.t0)
+        fault, sure = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
         doubted = doubted_of(calibrator, full)
-        refused = refused_beside_a_jump(full, fault, origin.t0, doubted)
-        if refused is not None:
-            fault, batches = None, full.batches
-        full = Examination(
-            engine,
-            testable,
-            t0=origin.t0,
-            batches=batches,
-            start=full,
-            refused=refused,
-            carried=carried,
-        ).with_noise()
+        told = fault_or_jump(full, fault, origin.t0, doubted, sure=sure)
+        fault = told if isinstance(told, Finding) else None
+        if told is not None:
+            batches = full.batches if fault is None else unbelieved(full, fault, origin.t0)
+            full = Examination(
+                engine,
+                testable,
+                t0=origin.t0,
+                batches=batches,
+                start=full,
+                refused=told if isinstance(told, Refused) else None,
+                carried=carried,
+            ).with_noise()
     full.let_epochs_go()
-    told = None if coarse is None else coarse.finding
-    return Cleared(full, testable, absent, rail, fault, spikes, told, clipped, sampled)
+    said = None if coarse is None else coarse.finding
+    return Cleared(full, testable, absent, rail, fault, spikes, said, clipped, sampled)
 
 
 def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch] | None:
@@ -183,10 +185,11 @@ class _Asked:
         Else from those of the accelerometer beside it: it has flown the same flight with the same
         receiver, and a search takes a third of the passes from there.  Else from where they are
         likeliest with nothing but scale, offset and timing: with every effect at once, a search
-        that knows nothing yet is led away by what effects make up for, and does not come back.
+        that knows nothing yet is led away by what effects make up for, and does not come back.  A
+        heading that seemed worse than usual may have been one of them, though.
         """
-        if start is None and self.beside is None:
-            start = self.plain(batches)
+        plain = self.plain(batches) if start is None and self.beside is None else None
+        start = start or plain
         made = Examination(
             self.engine,
             self.testable,
@@ -195,6 +198,8 @@ class _Asked:
             start=start,
             carried=self.carried,
         )
+        if plain is not None:
+            made.noise = plain.noise.with_usual_heading
         if start is None and self.beside is not None:
             made.begin_as(self.beside)
         return made.with_noise()

@@ -19,7 +19,8 @@ from math import log
 
 import numpy as np
 
-from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S, SEARCHED
+from onboard.core.diagnosis.effort import SEARCHED
+from onboard.core.diagnosis.limits import CLEARLY, CONTACT_S
 from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
 from onboard.core.estimate.limits import (
     FEWEST_WINDOWS,

@@ -16,6 +16,9 @@ WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
 another pass."""
 MOST_EFFECTS: Final = 5
 """Effects beside each other: more are a search without end."""
+SEARCHED: Final = 0.1
+"""Of a flight without a jump, that one is searched for in vain: it is decided later, with noise
+that is found with it in the model."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s: the likelihood bends over a second."""
 FURTHEST: Final = 3

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -25,6 +25,8 @@ from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.gps_fault import GpsFault
 from onboard.core.physics.finding import Finding, Quantity
 
+TO_THE_FIX_S = 1e-3
+"""s by which the ends of an interval, which are those of fixes, are read further."""
 ONSET = FEWEST_FIXES // 2 + 1
 """Fixes that show how a fault began: most of those that it has at least."""
 
@@ -60,42 +62,87 @@ def fault_effect(
     worst = max(spells, key=lambda s: s.size, default=None)
     if worst is None:
         return None
+    # A receiver that contradicts itself while the inertia is lost does not show its error.
+    spread = float(np.hypot(least / OFF, worst.spread))
+    off = Quantity(worst.size, spread, "m/s") if worst.size > 0.0 else None
+    return fault_of(batches, t0, intervals, off, _earth_axis(s.off for s in spells))
+
+
+def suspected(traces: Traces, t0: float) -> list[tuple[float, float]]:
+    """From where to where a receiver may have been off by less than no honest one is, s.
+
+    A filter is used to a small error after a few fixes.  What speaks for one is that it is taken
+    back: refused velocities at both ends that are off to opposite sides.
+
+    Args:
+        traces: of every epoch, with innovations as the flight was found to be.
+        t0: s on the boot clock.
+    """
+    refused = {float(traces.t[i]): by[:2] for i, by in traces.refused_by.items()}
+    seen = {**_heard_beside(traces), **refused}
+    left = [_spell(run, seen, t0, 0.0, np.inf) for run in _runs(traces, refused)]
+    out: list[tuple[float, float]] = []
+    while left:
+        first = left.pop(0)
+        back = next((k for k, s in enumerate(left) if _undoes(s.onset, first.off)), None)
+        if back is not None and left[back].start - first.end < LONGEST_FAULT_S:
+            out.append((first.start, left[back].start))
+            left = left[back + 1 :]
+    return out
+
+
+def fault_of(
+    batches: Sequence[Batch],
+    t0: float,
+    intervals: Sequence[tuple[float, float]],
+    off: Quantity | None,
+    axis: str,
+) -> Finding:
+    """A fault that lasts for some intervals (s since ``t0``), with what velocities are off by."""
     sizes = {"duration": Quantity(float(sum(b - a for a, b in intervals)), 0.5, "s")}
-    if worst.size > 0.0:
-        # A receiver that contradicts itself while the inertia is lost does not show its error.
-        spread = float(np.hypot(least / OFF, worst.spread))
-        sizes = {"offset": Quantity(worst.size, spread, "m/s"), **sizes}
     t = np.unique(np.concatenate([c.fixes.t for c in batches])) - t0
-    inside = np.any([(a <= t) & (t <= b) for a, b in intervals], axis=0)
     return Finding(
         name=GpsFault.effect,
-        unknowns=sizes,
-        share_of_mismatch=float(np.mean(inside)),
+        unknowns=sizes if off is None else {"offset": off, **sizes},
+        share_of_mismatch=float(np.mean(within(t, intervals))),
         delta_bic=0.0,
         held_out_before=float("nan"),
         held_out_after=float("nan"),
         parameters={},
         cure=GpsFault.cure,
-        where=spans(batches, t0, intervals, _earth_axis(spells)),
+        where=spans(batches, t0, intervals, axis),
         intervals=tuple(intervals),
     )
+
+
+def within(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """(n,) whether times are in one of the intervals."""
+    inside = np.zeros(len(t), dtype=bool)
+    for a, b in intervals:
+        inside |= (t >= a - TO_THE_FIX_S) & (t <= b + TO_THE_FIX_S)
+    return inside
 
 
 def _with_contradicted(
     spells: Sequence[_Spell], contradicted: Sequence[Contradiction], t0: float
 ) -> list[_Spell]:
-    """Both kinds in order of time; what the gate refused right beside one is of the same fault."""
+    """Both kinds in order of time; what the gate refused right beside one is of the same fault.
+
+    Unless it is off by something else; what undoes the error is a filter that had taken it.
+    """
     out = list(spells)
     for c in _until_undone(contradicted):
         start, end = c.start - t0, c.end - t0
-        near = [
-            s.start <= end + LONGEST_FIX_GAP_S and s.end >= start - LONGEST_FIX_GAP_S for s in out
+        beside = [
+            s
+            for s in out
+            if s.start <= end + LONGEST_FIX_GAP_S and s.end >= start - LONGEST_FIX_GAP_S
         ]
-        beside = [s for s, is_near in zip(out, near, strict=True) if is_near]
-        same = [s for s in beside if not _undoes(s.off, c.off)]
+        same = [s for s in beside if not _another(s.off, c.off)]
+        gone = [*same, *(s for s in beside if _undoes(s.off, c.off))]
         start = min([start, *(s.start for s in same)])
         end = max([end, *(s.end for s in same)])
-        out = [s for s, is_near in zip(out, near, strict=True) if not is_near]
+        out = [s for s in out if not any(s is x for x in gone)]
         out.append(_Spell(start, end, c.off, c.size, c.off, c.sigma))
     return sorted(out, key=lambda s: s.start)
 
@@ -218,13 +265,15 @@ def _spell(
     )
 
 
-def _earth_axis(spells: Sequence[_Spell]) -> str:
+def _earth_axis(offs: Iterable[Array | None]) -> str:
     """The horizontal axis on which the velocity was off most."""
-    known = [s for s in spells if s.off is not None and len(s.off) > 1]
-    if not known:
-        return "earth_north"
-    worst = max((s.off for s in known if s.off is not None), key=lambda x: float(np.linalg.norm(x)))
-    return "earth_north" if abs(worst[0]) >= abs(worst[1]) else "earth_east"
+    known = [off for off in offs if off is not None and len(off) > 1]
+    return earth_axis(max(known, key=lambda x: float(np.linalg.norm(x)), default=np.zeros(2)))
+
+
+def earth_axis(off: Array) -> str:
+    """The axis on which a horizontal velocity (2,) is larger."""
+    return "earth_north" if abs(off[0]) >= abs(off[1]) else "earth_east"
 
 
 def _steady(off: Sequence[Array], size: float) -> bool:

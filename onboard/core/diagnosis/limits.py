@@ -42,9 +42,6 @@ outside of the 95 % that two sigma stand for [probability]."""
 
 SETTLED_S: Final = 35.0
 """s on the boot clock after which an EKF has settled: before that its attitude jumps [tuned]."""
-SEARCHED: Final = 0.1
-"""Of a flight without a jump, that one is searched for in vain: it is decided later, with noise
-that is found with it in the model [cost]."""
 SCAN_S: Final = 4.0
 """s between the moments at which a jump is looked for: 3 s from where it is it explains half
 [physics: the time in which GPS corrects a velocity]."""
@@ -81,9 +78,9 @@ FEWEST_FIXES: Final = 5
 """Fixes from which dead reckoning can be compared [tuned]."""
 SAME: Final = 0.5
 """Share of its size by which an error may change and be the same error [tuned]."""
-JUMP_SHARE: Final = 0.5
-"""Share of a fault's velocities that may still be refused beside a jump which is there instead:
-beside one that is there nearly none is, and a fault is refused beside any jump, too [bound]."""
+LARGEST_FALSE: Final = 10.0
+"""m/s by which a velocity is false, one sigma: as fast as these vehicles fly, for what is told is
+where it was, or is, or nothing [physics]."""
 LONGEST_FAULT_S: Final = 120.0
 """s; what lasts longer is how the receiver is [tuned]."""
 SAME_FIX_S: Final = 0.1

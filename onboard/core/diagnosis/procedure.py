@@ -14,7 +14,7 @@ from math import inf, log
 
 from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot
 from onboard.core.diagnosis.companions import Companion, Companions
-from onboard.core.diagnosis.effort import FURTHEST
+from onboard.core.diagnosis.effort import FURTHEST, SEARCHED
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
@@ -32,7 +32,7 @@ from onboard.core.diagnosis.jumps import (
     shock_instead,
     shown_from,
 )
-from onboard.core.diagnosis.limits import CLEARLY, SEARCHED
+from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.nuisance_rivals import compared
 from onboard.core.diagnosis.records import Diagnosis, Unused
 from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from onboard.core.diagnosis.coasting import Contradiction, contradictions
 from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.faults import fault_effect
+from onboard.core.diagnosis.faults import fault_effect, fault_of, suspected, within
 from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
 from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused
 from onboard.core.estimate.calibrator import Calibrator
@@ -80,8 +79,11 @@ def doubted_of(calibrator: Calibrator, full: Examination) -> list[Refused]:
 
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
-) -> tuple[Finding | None, list[Batch]]:
-    """GPS velocities that cannot be true, and the flight with those not to be believed.
+) -> tuple[Finding | None, bool]:
+    """GPS velocities that cannot be true, or may not be.
+
+    Returns:
+        A fault, if there may be one; and whether there is, whatever the likelihood of the flight.
 
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
@@ -92,10 +94,11 @@ def false_fixes(
     every = (full.refused, full.refused_untuned, like.refused)
     rejected = any(refused["velocity"] for refused in every)
     if not rejected and not jumped and not doubted:
-        return None, list(full.batches)
+        return None, False
     contradicted = contradictions(full, levels, doubted)
+    traces = _asked_again(full, levels, contradicted, again=bool(doubted))
     fault = fault_effect(
-        _asked_again(full, levels, contradicted, again=bool(doubted)),
+        traces,
         full.batches,
         t0,
         least,
@@ -103,14 +106,19 @@ def false_fixes(
         _distrusted(calibrator, full, t0),
         contradicted,
     )
-    if fault is None:
-        return None, list(full.batches)
+    if fault is not None:
+        return fault, True
+    spans = suspected(traces, t0)
+    return (fault_of(full.batches, t0, spans, None, "") if spans else None), False
+
+
+def unbelieved(full: Examination, fault: Finding, t0: float) -> list[Batch]:
+    """The flight with the fixes of a fault not to be believed."""
     out = []
     for batch in full.batches:
-        t = full.point.true_time(batch.fixes.t) - t0
-        bad = _inside(t, fault.intervals)
+        bad = within(full.point.true_time(batch.fixes.t) - t0, fault.intervals)
         out.append(replace(batch, trusted=batch.trusted & ~bad))
-    return fault, out
+    return out
 
 
 def _asked_again(
@@ -137,17 +145,9 @@ def _asked_again(
         if again:
             heard = np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
             t = full.point.true_time(batch.fixes.t)
-            asked = replace(batch, trusted=heard & ~_inside(t, [(c.start, c.end) for c in known]))
+            asked = replace(batch, trusted=heard & ~within(t, [(c.start, c.end) for c in known]))
         traces.extend(through(made, asked, full.settings.coast_s).traces.at(solution.theta))
     return traces
-
-
-def _inside(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
-    """(n,) whether times are in one of the intervals."""
-    inside = np.zeros(len(t), dtype=bool)
-    for a, b in intervals:
-        inside |= (t >= a - 1e-3) & (t <= b + 1e-3)
-    return inside
 
 
 def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tuple[float, float]]:

@@ -72,15 +72,20 @@ def calibration_model(
 
 
 def possible(
-    point: Linearisation, model: Model, theta: Array, covariance: Array, *, shaped: bool = True
+    point: Linearisation,
+    model: Model,
+    estimate: tuple[Array, Array],
+    wanders: float = 0.0,
+    *,
+    shaped: bool = True,
 ) -> Array:
     """The likeliest unknowns with which the linearisation stays within what is possible.
 
     Args:
         point: the linearisation that the estimate is about.
         model: its model.
-        theta: (m,) estimate.
-        covariance: (m, m) of it.
+        estimate: (m,) unknowns, and (m, m) covariance.
+        wanders: variance of what the heading is off by for a while, rad^2.
         shaped: whether shapes of a receiver's response may move.
     """
     low, high = np.full(model.size, -math.inf), np.full(model.size, math.inf)
@@ -93,7 +98,31 @@ def possible(
     )
     for name, (now, least, most) in zip(MOVING, ranges, strict=True):
         low[model.index[name]], high[model.index[name]] = least - now, most - now
-    return bounded(theta, covariance, low, high)
+    theta = _with_all_of_the_heading(point, model, estimate, wanders)
+    return bounded(theta, estimate[1], low, high)
+
+
+def _with_all_of_the_heading(
+    point: Linearisation, model: Model, estimate: tuple[Array, Array], wanders: float
+) -> Array:
+    """Unknowns with all that the heading is off by in the mean, which is where it is linear.
+
+    A heading that is wrong all the time and one that is for a while enter alike, and share what a
+    flight shows as their variances are: the number gets little of it beside a level that has room
+    for anything.  What wanders counts as one error for as long as it is seen, and as no more than
+    what the number is unsure by without its prior.
+
+    Args:
+        point: the linearisation that the estimate is about.
+        model: its model.
+        estimate: (m,) unknowns, and (m, m) covariance.
+        wanders: variance of what wanders, rad^2.
+    """
+    i, out = model.index["heading"], estimate[0].copy()
+    prior, known = model.prior_sigma[i] ** 2, 1.0 / estimate[1][i, i]
+    seen = max(known - 1.0 / prior, 0.0)
+    out[i] += (point.heading + out[i]) * min(wanders, 1.0 / seen if seen else wanders) / prior
+    return out
 
 
 def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:

@@ -292,7 +292,7 @@ class Engine(Watched):
             elsewhere = not self.point.stands_for(way.go(asked, found, self.model))
             if elsewhere:
                 self._move(way.at, self.noise)
-                ready = Preparations()
+                ready = ready.elsewhere()
         self._move(way.at, self.noise)
 
     def nuisances(self, found: Solution) -> Array:
@@ -302,7 +302,8 @@ class Engine(Watched):
     def asked(self, theta: Array, covariance: Array, model: Model | None = None) -> Linearisation:
         """What linearisation an estimate (m,), (m, m) of a model asks for; None: of its own."""
         model = model or self.model
-        within = possible(self.point, model, theta, covariance, shaped=self.shaped)
+        wanders, estimate = self.noise.heading**2, (theta, covariance)
+        within = possible(self.point, model, estimate, wanders, shaped=self.shaped)
         return moved(self.point, model, within)
 
     @property

@@ -84,38 +84,56 @@ def _add(row: Array, a: float, x: Array, b: float, y: Array, c: float, z: Array)
 def _from_the_left(F: Array, C: Array) -> None:
     """``F C`` in place: rows of the states that are driven by others, by what is not zero in F."""
     _add(C[3], F[3, 2], C[2], F[3, 4], C[4], F[3, 5], C[5])  # the velocity of before
+    x, y, z = C[7], C[8], C[9]
     for i in range(3):
         j, k = (5, 6) if i == 0 else (4, 6) if i == 1 else (4, 5)
         row, one, two = C[i], C[j], C[k]
-        a, b = F[i, j], F[i, k]
+        a, b, d, e, f = F[i, j], F[i, k], F[i, 7], F[i, 8], F[i, 9]
         for c in range(len(row)):
-            row[c] = row[c] + a * one[c] + b * two[c]
-        _add(row, F[i, 7], C[7], F[i, 8], C[8], F[i, 9], C[9])
+            row[c] = row[c] + a * one[c] + b * two[c] + d * x[c] + e * y[c] + f * z[c]
     for i in range(4, 7):
-        _add(C[i], F[i, 7], C[7], F[i, 8], C[8], F[i, 9], C[9])
+        _add(C[i], F[i, 7], x, F[i, 8], y, F[i, 9], z)
 
 
 @part
-def _from_the_right(F: Array, decay: Array, swing: Array, P: Array) -> None:
-    """``P F^T`` in place.
+def _slow(decay: Array, swing: Array, C: Array) -> None:
+    """Slow errors decay in place, each for itself; that of the heading with its rate."""
+    for i in range(MEASURED - 1):
+        row, kept = C[ERRORS + i], decay[i]
+        for c in range(len(row)):
+            row[c] *= kept
+    angle, rate = C[HEADING], C[RATE]
+    stays, added, back, goes = decay[MEASURED - 1], swing[0], swing[1], swing[2]
+    for c in range(len(angle)):
+        x, u = angle[c], rate[c]
+        angle[c] = stays * x + added * u
+        rate[c] = back * x + goes * u
+
+
+@part
+def _from_the_right(F: Array, decay: Array, swing: Array, C: Array, at: int) -> None:
+    """``P F^T`` in place, of the covariance that begins at column ``at``.
 
     Of all rows, though half of a symmetric matrix says it all: what is mirrored is symmetric to the
     last digit, the rest is not, and where angles are read to a tenth of a milliradian the rounding
     errors of the noise in the regressors then grow twofold with each step.
     """
-    for i in range(STATES):
-        row = P[i]
+    a, b, c, d, e = F[0, 5], F[0, 6], F[0, 7], F[0, 8], F[0, 9]
+    f, g, h, i, j = F[1, 4], F[1, 6], F[1, 7], F[1, 8], F[1, 9]
+    k, l, m, n, o = F[2, 4], F[2, 5], F[2, 7], F[2, 8], F[2, 9]  # noqa: E741 - in a row
+    for s in range(STATES):
+        row = C[s, at : at + STATES]
         error, rate = row[HEADING], row[RATE]
-        for j in range(MEASURED):
-            row[ERRORS + j] *= decay[j]
+        for q in range(MEASURED):
+            row[ERRORS + q] *= decay[q]
         row[HEADING] += swing[0] * rate
         row[RATE] = swing[1] * error + swing[2] * rate
         row[3] = row[3] + F[3, 2] * row[2] + F[3, 4] * row[4] + F[3, 5] * row[5]
         u, v, w = row[4], row[5], row[6]
         x, y, z = row[7], row[8], row[9]
-        row[0] = row[0] + F[0, 5] * v + F[0, 6] * w + F[0, 7] * x + F[0, 8] * y + F[0, 9] * z
-        row[1] = row[1] + F[1, 4] * u + F[1, 6] * w + F[1, 7] * x + F[1, 8] * y + F[1, 9] * z
-        row[2] = row[2] + F[2, 4] * u + F[2, 5] * v + F[2, 7] * x + F[2, 8] * y + F[2, 9] * z
+        row[0] = row[0] + a * v + b * w + c * x + d * y + e * z
+        row[1] = row[1] + f * u + g * w + h * x + i * y + j * z
+        row[2] = row[2] + k * u + l * v + m * x + n * y + o * z
         row[4] = u + F[4, 7] * x + F[4, 8] * y + F[4, 9] * z
         row[5] = v + F[5, 7] * x + F[5, 8] * y + F[5, 9] * z
         row[6] = w + F[6, 7] * x + F[6, 8] * y + F[6, 9] * z
@@ -141,33 +159,30 @@ def predict(
     """Carry (B, STATES, C) through one step, in place: F, then process noise and what drives it."""
     members, _, columns = carried.shape
     m1 = stack.shape[1]
-    F = np.zeros((MEASURED, ERRORS))
+    count = (columns - m1) // STATES
+    F, driven = np.zeros((MEASURED, ERRORS)), np.zeros((MEASURED, m1))
     _transition(duration, R_nb, moved, F)
+    _drive(R_nb, stack, driven)
+    for i in range(MEASURED):
+        driven[i, 0] += fall[i]
     for b in range(members):
         C = carried[b]
         for i in range(STATES):
             C[i, m1 + i] += before[b, i]
         _from_the_left(F, C)
-        angle, rate = C[HEADING], C[RATE]
-        kept, added = decay[b, MEASURED - 1], swing[b, 0]
-        back, rate_kept = swing[b, 1], swing[b, 2]
-        for c in range(columns):
-            x, u = angle[c], rate[c]
-            angle[c] = kept * x + added * u
-            rate[c] = back * x + rate_kept * u
-        for i in range(MEASURED - 1):
-            C[ERRORS + i] *= decay[b, i]
-        for at in range(m1, columns, STATES):
-            _from_the_right(F, decay[b], swing[b], C[:, at : at + STATES])
+        _slow(decay[b], swing[b], C)
+        for at in range(m1, m1 + count * STATES, STATES):
+            _from_the_right(F, decay[b], swing[b], C, at)
         for i in range(STATES):
             C[i, m1 + i] += after[b, i]
         _spread(R_nb, missed, 0, C[0:3, m1 : m1 + 3])
         _spread(R_nb, missed, 3, C[4:7, m1 + 4 : m1 + 7])
-        _drive(R_nb, stack, C)
         for i in range(MEASURED):
-            C[i, 0] += fall[i]
+            row, more = C[i], driven[i]
+            for c in range(m1):
+                row[c] += more[c]
     # Unit white noise of each body axis, where it is carried.
-    for axis in range((columns - m1) // STATES - 1):
+    for axis in range(count - 1):
         at = m1 + (axis + 1) * STATES
         for i in range(3):
             for j in range(3):
@@ -248,8 +263,8 @@ def _less_four(row: Array, gain: Array, W: Array, first: int) -> None:
 
 
 @part
-def _less_seven(C: Array, G: Array, at: int, W: Array) -> None:
-    """C less the transpose of ``G[:, at:]`` times the seven rows of W: (STATES, n), (7, n).
+def _less_seven(C: Array, first: int, width: int, G: Array, at: int, W: Array) -> None:
+    """Columns of C less the transpose of ``G[:, at:]`` times the seven rows of W (7, width).
 
     Two rows in one go through memory take half as long as one by one, and where there are fewer
     innovations, rows of zeros cost less than a loop over those that there are.
@@ -259,10 +274,11 @@ def _less_seven(C: Array, G: Array, at: int, W: Array) -> None:
         a, b, c, d, e, f, g = G[0, j], G[1, j], G[2, j], G[3, j], G[4, j], G[5, j], G[6, j]
         j = at + i + 1
         p, q, r, s, t, u, v = G[0, j], G[1, j], G[2, j], G[3, j], G[4, j], G[5, j], G[6, j]
-        for k in range(C.shape[1]):
+        one, two = C[i, first : first + width], C[i + 1, first : first + width]
+        for k in range(width):
             m, n, o, w, x, y, z = W[0, k], W[1, k], W[2, k], W[3, k], W[4, k], W[5, k], W[6, k]
-            C[i, k] = C[i, k] - a * m - b * n - c * o - d * w - e * x - f * y - g * z
-            C[i + 1, k] = C[i + 1, k] - p * m - q * n - r * o - s * w - t * x - u * y - v * z
+            one[k] = one[k] - a * m - b * n - c * o - d * w - e * x - f * y - g * z
+            two[k] = two[k] - p * m - q * n - r * o - s * w - t * x - u * y - v * z
 
 
 @compiled("void(f8[:,:,::1], f8[:,:,::1], i8)")
@@ -273,7 +289,7 @@ def take(carried: Array, W: Array, m1: int) -> None:
     fours = r - r % 4
     for b in range(members):
         if r == MEASURED:
-            _less_seven(carried[b], W[b], m1, W[b])
+            _less_seven(carried[b], 0, columns, W[b], m1, W[b])
             continue
         for i in range(STATES):
             row, gain = carried[b, i], W[b, :, m1 + i]
@@ -300,8 +316,8 @@ def take_noise(C: Array, W: Array, whitener: Array, number: Index, m1: int, gram
             for d in range(a + 1):
                 j = at + number[d]
                 gram[axis] -= (W[a, j] + W[a, j + ERRORS]) * whitener[a, d]
-        block = C[:, at : at + STATES]
         for i in range(STATES):
+            row = C[i, at : at + STATES]
             for a in range(r):
-                read[a, i] = block[i, number[a]] + block[i, number[a] + ERRORS]
-        _less_seven(block, read, 0, K)
+                read[a, i] = row[number[a]] + row[number[a] + ERRORS]
+        _less_seven(C, at, STATES, read, 0, K)

@@ -108,10 +108,11 @@ def carry(
         swing[b, 2] = (1.0 - x) * shrunk
         for i in range(STATES):
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
+        as_stated = stated ** powers[b, 1]
         for i in range(MEASURED - 1):
             driven = settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
             if i < 3:
-                driven *= stated ** powers[b, 1]
+                driven *= as_stated
             after[b, ERRORS + i] += driven
     predict(carried, R_nb, T, moved, columns, missed, fall, decay, swing, before, after)
     for i in range(3):

@@ -96,6 +96,17 @@ class NoiseLevels:
             if name not in NO_VARIANCES and getattr(self, name) >= LIMITS[name][1] * np.exp(-NUDGE)
         )
 
+    @property
+    def with_usual_heading(self) -> NoiseLevels:
+        """The same with a heading that is as good as usual, if it seems worse: to be found anew.
+
+        What makes a heading seem worse may be that it is wrong all the time.  No search finds that
+        from a level that has room for it: the number that it is has a prior in every model.
+        """
+        if self.heading <= USUAL.heading:
+            return self
+        return replace(self, heading=USUAL.heading, heading_time=USUAL.heading_time)
+
 
 USUAL = NoiseLevels(stated=0.5, stated_colour=0.5)
 """Levels that a flight is expected to have."""

@@ -1,7 +1,7 @@
 """Flight in which nothing is out of the ordinary: many epochs in one call of compiled loops.
 
-Most epochs are like that: no gate refuses anything, nothing is in the tail of its distribution.
-They go through :mod:`onboard.core.filter.runs`; what is left goes through
+Most epochs are like that: no gate refuses anything.  They go through
+:mod:`onboard.core.filter.runs`; what is left goes through
 :class:`~onboard.core.filter.whitening.WhiteningFilter` one by one, whose arithmetic it is.
 """
 
@@ -23,6 +23,7 @@ from onboard.core.filter.limits import (
 from onboard.core.filter.prepared import Prepared
 from onboard.core.filter.readings import Index
 from onboard.core.filter.traces import Traces
+from onboard.core.filter.uncertainty import Covariance, Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -31,6 +32,8 @@ _TIMES = np.array([COLOUR_TIME_S, ATTITUDE_TIME_S])
 _TAILS = np.array([np.inf, TAIL[1], TAIL[2], TAIL[3]])
 _BELIEVED, _REFUSED = 1, 2
 """What may be known of a velocity before it is looked at; 0: nothing."""
+_NO_COVARIANCE = 2
+"""What :func:`onboard.core.filter.runs.run` answers where one is not positive."""
 
 
 class Gone(NamedTuple):
@@ -114,13 +117,17 @@ class OrdinaryFlight:
         self._states = np.empty((n, 15))
         self._ends = np.ascontiguousarray(ready.measured, dtype=np.int64)
 
-    def go(self, step: int, theta: Array, most: int) -> Gone:
+    def go(self, step: int, theta: Array, uncertainty: Uncertainty, most: int) -> Gone:
         """Go on from a step (its number) until ``most`` epochs are taken or one is not ordinary.
 
         Args:
             step: number of the first step.
             theta: (m,) estimate.
+            uncertainty: how well it is known.
             most: epochs.
+
+        Raises:
+            numpy.linalg.LinAlgError: a covariance is not positive.
         """
         made, steps, epochs = self._filter, self._ready.steps, self._ready.epochs
         progress = np.array([step, 0, 0, made.updates])
@@ -158,6 +165,9 @@ class OrdinaryFlight:
             levels.heading_time,
             levels.stated,
             _TAILS,
+            np.ascontiguousarray(uncertainty.matrix),
+            int(not isinstance(uncertainty, Covariance)),
+            np.array([made.t - made.taken_t]),
             STANDARD_GRAVITY,
             int(made.uses.earth),
             int(gram is not None),
@@ -168,6 +178,8 @@ class OrdinaryFlight:
             self._taken,
             self._states,
         )
+        if pending == _NO_COVARIANCE:
+            raise np.linalg.LinAlgError("the covariance of the innovations is not positive")
         return self._gone(step, progress, pending=bool(pending))
 
     def _gone(self, step: int, progress: Index, *, pending: bool) -> Gone:

@@ -168,11 +168,10 @@ class Pass:
         found = None if kept is None else kept.of(source)
         if found is not None and found.serves(self.bias_b):
             return found
-        if found is None:
+        segment = None if kept is None else kept.remembered(source)
+        if segment is None:
             before = source.before.slow if source.before else {}
             segment = self.model.remembering(source.segment, before)
-        else:
-            segment = found.segment
         made = self.made_anew(source, segment)
         if kept is not None:
             kept.keep(made)
@@ -206,7 +205,7 @@ class Pass:
         while k < len(ends):
             begun = False
             if ordinary is not None and self.filter.calm:
-                gone = ordinary.go(k, self.theta, self._until_solved)
+                gone = ordinary.go(k, self.theta, self.uncertainty, self._until_solved)
                 self._note_all(gone, ready, result, sums)
                 k, begun = gone.step, gone.pending
                 if not begun:

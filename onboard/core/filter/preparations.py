@@ -4,6 +4,7 @@ What a segment is made ready from - times of fixes without latency, the force of
 force, effects of a given size - is that of a linearisation and a model.  While neither changes,
 only noise levels and the gyroscope's bias do from pass to pass.  A bias is a state of the filter:
 it goes on from a segment that was made ready with another one as soon as that state counts from it.
+What effects remember is of the samples alone, and the same about another linearisation.
 """
 
 from __future__ import annotations
@@ -79,8 +80,15 @@ class Preparations:
     def __init__(self, most_bytes: int | None = None) -> None:
         """Take how much may be kept; None: what the program can spare."""
         spare = MOST_PREPARED_BYTES if preferred() else 0
-        self._room = spare if most_bytes is None else most_bytes
+        self._most = self._room = spare if most_bytes is None else most_bytes
         self._kept: dict[tuple[int, ...], Kept] = {}
+        self._remembered: dict[tuple[int, ...], tuple[Source, Segment]] = {}
+
+    def elsewhere(self) -> Preparations:
+        """For passes about another linearisation, with the same effects in the model."""
+        made = Preparations(self._most)
+        made._remembered = self._remembered
+        return made
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -89,6 +97,11 @@ class Preparations:
         """What was made of the same; None: nothing."""
         return self._kept.get(source.key)
 
+    def remembered(self, source: Source) -> Segment | None:
+        """Its segment with what effects remember; None: nobody has asked for it yet."""
+        found = self._remembered.get(source.key)
+        return None if found is None else found[1]
+
     def keep(self, made: Kept) -> None:
         """Keep it if there is room, in the place of what was made of the same."""
         before = self._kept.pop(made.of.key, None)
@@ -96,4 +109,5 @@ class Preparations:
             self._room += before.size
         if made.size <= self._room:
             self._kept[made.of.key] = made
+            self._remembered[made.of.key] = made.of, made.segment
             self._room -= made.size

@@ -143,7 +143,7 @@ def _epochs(
     nodes: Around,
     c: SegmentRegressors,
 ) -> Epochs:
-    R_att, near = point.attitude(segment, nodes.now.t)
+    R_att, near = point.attitude(segment, nodes.now.t, nodes.now.curve)
     known = nodes.averaged + nodes.swing @ segment.lever_arm_b
     lower = np.einsum("ka,ka->k", R_att[:, 2], nodes.averaged_place)
     lower += STANDARD_GRAVITY * point.window**2 / 24.0

@@ -1,10 +1,10 @@
 """Many epochs in one call: the loop over steps and epochs that numba compiles.
 
 What :class:`~onboard.core.filter.whitening.WhiteningFilter` does to an epoch of which a gate
-refuses nothing, and of which nothing is in the tail of its distribution, epoch after epoch, until
-one is not like that.  Equal to it to rounding, in all 18 states
-(:mod:`~onboard.core.filter.state`).  numba notices changes of this file alone: whoever changes
-:mod:`~onboard.core.filter.loops` or :mod:`~onboard.core.filter.motion` has to touch this one, too.
+refuses nothing, epoch after epoch, until one is not like that.  Equal to it to rounding, in all 18
+states (:mod:`~onboard.core.filter.state`).  numba notices changes of this file alone: whoever
+changes :mod:`~onboard.core.filter.loops`, :mod:`~onboard.core.filter.motion` or
+:mod:`~onboard.core.filter.tail_loops` has to touch this one, too.
 """
 
 from __future__ import annotations
@@ -16,26 +16,9 @@ from onboard.core.filter.loops import measured, take, take_noise, whiten
 from onboard.core.filter.motion import angle_of, carry, mean, turn_by
 from onboard.core.filter.readings import Index
 from onboard.core.filter.state import MEASURED, STATES
+from onboard.core.filter.tail_loops import NOTHING, UNTOLD, tails_of, widen
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiler import compiled, part
-
-
-@part
-def _ordinary(W: Array, theta: Array, offered: Index, tails: Array) -> bool:
-    """Whether nothing is in the tail of its distribution: gates are further out."""
-    at = 0
-    counts = (offered[0], offered[1], 2 * offered[2], offered[2])
-    for kind in range(4):
-        n, nis = counts[kind], 0.0
-        for a in range(at, at + n):
-            x = W[0, a, 0]
-            for c in range(len(theta)):
-                x -= W[0, a, c + 1] * theta[c]
-            nis += x * x
-        at += n
-        if n > 0 and not nis <= tails[n]:
-            return False
-    return True
 
 
 @part
@@ -79,11 +62,12 @@ def _sum(
     """Variances (B, n) and what an epoch (n,) adds to them, as ``Variances.of_reading``."""
     out = np.empty(white.shape)
     for b in range(len(white)):
+        as_stated = stated ** powers[b, 0]
         for i in range(len(more)):
             out[b, i] = white[b, i]
             if i < 3:
                 least = min(out[b, i], LEAST_VELOCITY_VAR)
-                out[b, i] = max(out[b, i] * stated ** powers[b, 0], least)
+                out[b, i] = max(out[b, i] * as_stated, least)
             out[b, i] += more[i] + jitter[b] * moving[i]
     return out
 
@@ -130,7 +114,7 @@ def _note(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
     " f8[:,:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1],"
     " f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1],"
-    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8, i8, i8,"
+    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], i8, f8[::1], f8, i8, i8,"
     " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
@@ -165,6 +149,9 @@ def run(
     heading_time: Array,
     powers: Array,
     tails: Array,
+    known: Array,
+    form: int,
+    since: Array,
     gravity: float,
     earth: int,
     noisy: int,
@@ -212,6 +199,9 @@ def run(
         heading_time: (B,) of that of the heading, s.
         powers: (B, 2) of ``stated`` with which the velocity's variances go.
         tails: (4,) by degrees of freedom.
+        known: (m, m) how well the estimate is known: by its covariance, or by its information.
+        form: which of the two, as of :mod:`~..tail_loops`.
+        since: (1,) s since something of an epoch was taken.
         gravity: m/s^2.
         earth: whether it turns.
         noisy: whether the noise in regressors is carried.
@@ -223,14 +213,15 @@ def run(
         states: (n, 15) velocity innovation, attitude and velocity after each of them.
 
     Returns:
-        1 if the step ``progress[0]`` was made, but the epoch at its end is out of the ordinary;
-        else 0.
+        1 if the step ``progress[0]`` was made, but the epoch at its end is out of the ordinary; 2
+        if a covariance is none; else 0.
     """
     members, _, width = carried.shape
     m1 = columns.shape[2]
     turned, stop = np.zeros(3), progress[2] + most
     E, W = np.empty((MEASURED, m1)), np.empty((members, MEASURED, width))
     whitener, var = np.zeros((MEASURED, MEASURED)), np.empty((members, MEASURED))
+    factor = np.empty(4)
     while progress[0] < len(duration) and progress[2] < stop:
         k = progress[0]
         e = ends[k]
@@ -253,6 +244,7 @@ def run(
             gravity,
             earth,
         )
+        since[0] += duration[k]
         if e < 0:
             progress[0] += 1
             continue
@@ -269,11 +261,17 @@ def run(
         reads = _sum(white, noise[e], jitter, moving[e], powers, stated[e])
         if whiten(carried, z, number, reads, E, W, whitener, var):
             return 1
-        if not _ordinary(W, theta, offered[e], tails):
+        tail = tails_of(W, theta, offered[e], tails, known, form, factor)
+        if tail == UNTOLD:
             return 1
+        if tail != NOTHING:
+            widen(carried, m1, offered[e], factor, var, since[0], reads)
+            if whiten(carried, z, number, reads, E, W, whitener, var):
+                return 2
         take(carried, W, m1)
         if noisy:
             take_noise(carried[0], W[0], whitener, number, m1, gram)
+        since[0] = 0.0
         progress[3] += 1
         if progress[3] % symmetry == 0:
             _symmetric(carried, m1)

@@ -124,7 +124,7 @@ class Segment:
         """Interpolant of (rate, raw) stacked to (n, 6)."""
         return Hermite(self.t, np.hstack([self.w_b, self.raw_s]))
 
-    def _between_samples(self, at: Array, delay: float) -> Array:
+    def _between_samples(self, at: Array, delay: float, curve: Hermite | None) -> Array:
         t_k = self.t_attitude
         if len(t_k) < 2:
             return interpolate_rotation(at, t_k, self.R_attitude[:])
@@ -136,7 +136,7 @@ class Segment:
         loops = compiled_loops()
         if loops is not None:
             between = np.empty((len(at), 3, 3))
-            rates = Hermite(self.t, self.w_b)
+            rates = curve or Hermite(self.t, self.w_b)
             samples = plain(t_k), plain(R_k)
             loops.attitudes(rates.t, rates.cubics, *samples, plain(at), delay, PARTS, between)
             return between
@@ -187,7 +187,9 @@ class Segment:
         out: Array = x[i] + share * (x[i + 1] - x[i])
         return out
 
-    def attitude_at(self, at: Array, delay: float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
+    def attitude_at(
+        self, at: Array, delay: float = 0.0, curve: Hermite | None = None
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude at ``at`` (m,), and where samples are near enough to vouch for it.
 
         Between samples it turns as the gyroscope says, and what that misses of the next sample is
@@ -196,8 +198,9 @@ class Segment:
         Args:
             at: (m,) on the clock of the attitude, s.
             delay: by how much that clock is ahead of the gyroscope's, s.
+            curve: :meth:`interpolant`, where there is one already.
         """
-        R = self._between_samples(at, delay)
+        R = self._between_samples(at, delay, curve)
         if len(self.t_attitude) < 2:
             return R, np.zeros(len(at), dtype=bool)
         i = np.minimum(

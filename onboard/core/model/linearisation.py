@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array, Vector4, vector3, vector4
 from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.maths.interpolation import Hermite
 
 SHAPES = ("mostly_newer", "mostly_older", "leaning", "lagging")
 """How a receiver may weigh what is in its span, beside an even mean."""
@@ -112,9 +113,11 @@ class Linearisation:
             float(np.abs(np.subtract(a, b)).max()) < most for a, b, most in moves
         )
 
-    def attitude(self, segment: Segment, t: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def attitude(
+        self, segment: Segment, t: Array, curve: Hermite | None = None
+    ) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""
-        R, near = segment.attitude_at(t + self.attitude_delay, self.attitude_delay)
+        R, near = segment.attitude_at(t + self.attitude_delay, self.attitude_delay, curve)
         return _turned(-self.heading) @ R, near
 
     @property

@@ -18,6 +18,7 @@ from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiling import compiled_loops, plain
 from onboard.core.maths.frames import cross, interpolate_rotation, rotation_from_vector
+from onboard.core.maths.interpolation import Hermite
 
 NODES_PER_SAMPLE = 1.5
 """Of the samples' rate, at least: what vibrates at up to half of it is then resolved and cancels,
@@ -39,6 +40,7 @@ class Signals:
         segment: where slow signals are looked up.
         P: (K, n, 3, 3) body axes at each of n nodes in a row to those at the first of them; None
             where the nodes are in no such rows.
+        curve: the samples' interpolant.
     """
 
     t: Array
@@ -47,6 +49,7 @@ class Signals:
     f_b: Array
     segment: Segment
     P: Array | None = None
+    curve: Hermite | None = None
 
     def slow(self, name: str) -> Array | None:
         """Slow signal at these times, S or (*S, k); None if the recording lacks it."""
@@ -238,14 +241,14 @@ class NodeMaker:
         self._bias = bias_b
         self._six = six
         self.recorded = recorded_attitude
-        self._at = segment.interpolant()
+        self.curve = segment.interpolant()
         self._felt = plain(bias_b), plain(six), plain(segment.R_bs)
         self.rate = float((len(segment.t) - 1) / (segment.t[-1] - segment.t[0]))
 
     @property
     def _samples(self) -> tuple[Array, Array]:
         """What compiled loops interpolate: times of the samples and cubics between them."""
-        return self._at.t, self._at.cubics
+        return self.curve.t, self.curve.cubics
 
     def signals(self, t: Array) -> Signals:
         """Signals at times ``t`` of any shape."""
@@ -254,11 +257,11 @@ class NodeMaker:
             w, raw, f_b = np.empty((3, *t.shape, 3))
             flat = w.reshape(-1, 3), raw.reshape(-1, 3), f_b.reshape(-1, 3)
             loops.signals(*self._samples, plain(t).ravel(), *self._felt, *flat)
-            return Signals(t, w, raw, f_b, self.segment)
-        x = self._at(t)
+            return Signals(t, w, raw, f_b, self.segment, None, self.curve)
+        x = self.curve(t)
         raw = x[..., 3:]
         f_b = (raw * self._six[:3] + self._six[3:]) @ self.segment.R_bs.T
-        return Signals(t, x[..., :3] - self._bias, raw, f_b, self.segment)
+        return Signals(t, x[..., :3] - self._bias, raw, f_b, self.segment, None, self.curve)
 
     def intervals(self, start: Array, end: Array) -> Intervals:
         """Nodes in the intervals ``start`` ... ``end`` (K,), as dense as the samples or denser."""
@@ -282,7 +285,7 @@ class NodeMaker:
         if loops is not None:
             (w, raw, f_b), P = np.empty((3, *t.shape, 3)), np.empty((*t.shape, 3, 3))
             loops.inside(*self._samples, t, step, *self._felt, w, raw, f_b, P)
-            return Signals(t, w, raw, f_b, self.segment, P), P
+            return Signals(t, w, raw, f_b, self.segment, P, self.curve), P
         nodes = self.signals(t)
         between = self.signals(t[:, :-1] + 0.5 * step[:, None])
         rates = np.empty((len(t), 2 * t.shape[1] - 1, 3))

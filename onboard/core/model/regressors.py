@@ -29,6 +29,7 @@ from onboard.core.inputs.segments import Segment, Signal
 from onboard.core.maths.arrays import Array
 from onboard.core.model.around import Around
 from onboard.core.model.quadrature import Intervals, OfSensors, Signals
+from onboard.core.model.spread import Spread
 from onboard.errors import OnboardError
 
 
@@ -286,7 +287,8 @@ class Model:
         m, K, epochs = self.size, len(intervals.duration), len(around.now.t)
         gained, body = np.zeros((K, 9, m + 1)), np.zeros((epochs, 9, m + 1))
         ned, along = np.zeros((epochs, 9, m)), np.zeros((epochs, m))
-        of, acting = intervals.of_sensors(), np.zeros(m, dtype=np.bool_)
+        of = intervals.of_sensors()
+        averaged: list[tuple[slice, Array]] = []
         for family in self.families:
             if not family.available(around.now):
                 continue
@@ -296,7 +298,7 @@ class Model:
             if family.is_averaged and around.spread is not None:
                 there = family.acceleration(around.spread.nodes)
                 if there is not None:
-                    around.spread.of(there, body[:, 0:3, columns], body[:, 3:6, columns])
+                    averaged.append((columns, there))
             for first, d in (
                 (0, family.velocity(around)),
                 (3, family.position(around)),
@@ -306,10 +308,29 @@ class Model:
                     body[:, first : first + 3, columns] += d.body
                 if d.ned is not None:
                     ned[:, first : first + 3, s] = d.ned
-                    acting[s] |= d.ned.any(axis=(0, 1))
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
-        return SegmentRegressors(gained, body, ned, along, of, np.flatnonzero(acting))
+        if averaged and around.spread is not None:
+            _averaged(averaged, around.spread, body)
+        acting = np.flatnonzero((ned != 0.0).any(axis=(0, 1)))
+        return SegmentRegressors(gained, body, ned, along, of, acting)
+
+
+def _averaged(parts: Sequence[tuple[slice, Array]], spread: Spread, body: Array) -> None:
+    """Add what a receiver makes of accelerations, all at once, to a stack (K, 9, m + 1).
+
+    Args:
+        parts: columns of each, and (n, 3, k) at the nodes of what is averaged.
+        spread: what the receiver makes of them.
+        body: the stack.
+    """
+    there = np.concatenate([a for _, a in parts], axis=-1)
+    both = np.empty((len(body), 6, there.shape[-1]))
+    spread.of(there, both[:, 0:3], both[:, 3:6])
+    at = 0
+    for columns, a in parts:
+        body[:, 0:6, columns] += both[:, :, at : at + a.shape[-1]]
+        at += a.shape[-1]
 
 
 def _accelerated(family: Family, intervals: Intervals, of: OfSensors, out: Array) -> None:

@@ -13,7 +13,7 @@ Left out, a tilt of two degrees is found a twentieth too small behind a receiver
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,14 +100,18 @@ def velocity_weights(since: Array, step: float, window: float, apart: float, h: 
         apart: epochs, s.
         h: (4,) shares of the shapes beside the even mean.
     """
-    gains = _gains(window, apart, h)
+    shapes, loops = _shapes(window, apart, h), compiled_loops()
+    out: Array = np.empty_like(since)
+    if loops is not None:
+        loops.averaging(plain(since), step, shapes, out)
+        return out
     ends = np.concatenate([since - 0.5 * step, since[:, -1:] + 0.5 * step], axis=1)
     ahead = np.maximum(-ends, 0.0)
     # What of the integral is beyond either end of a step.
-    beyond = sum(
-        (share * (mean_beyond(ends) - ahead) for share, mean_beyond in gains), np.zeros_like(ends)
-    )
-    out: Array = beyond[:, :-1] - beyond[:, 1:]
+    beyond = np.zeros_like(ends)
+    for share, *shape in shapes.tolist():
+        beyond += share * (_beyond(shape, ends) - ahead)
+    np.subtract(beyond[:, :-1], beyond[:, 1:], out=out)
     return out
 
 
@@ -117,44 +121,43 @@ def place_weights(since: Array, step: float, window: float) -> Array:
     return out
 
 
-MeanBeyond = Callable[[Array], Array]
-"""``E max(tau - x, 0)`` of a response."""
+EVEN, TWO, LAGGED = 0.0, 1.0, 2.0
+"""Kinds of responses: an even mean over a span (s); two moments, with the weight of the older one
+and how far they are apart (s); a first-order lag of a time constant (s)."""
 
 
-def _gains(window: float, apart: float, h: Array) -> list[tuple[float, MeanBeyond]]:
-    """Shares that add up to one (leaning to nothing), and what each shape has beyond a place."""
-    half, lag, less = 0.5 * window, window / SPREAD, weight_of_two(window, apart)
+def _beyond(shape: Sequence[float], x: Array) -> Array:
+    """``E max(tau - x, 0)`` of a response (kind, and what that asks for) beyond places x, s."""
+    kind, a, b = shape
+    if kind == EVEN:
+        within = np.clip(0.5 * a - x, 0.0, a)
+        even: Array = np.where(x < -0.5 * a, -x, within**2 / (2.0 * a))
+        return even
+    if kind == TWO:
+        newest, oldest = np.maximum(a * b - x, 0.0), np.maximum((a - 1.0) * b - x, 0.0)
+        two: Array = (1.0 - a) * newest + a * oldest
+        return two
+    before = np.maximum(a - x, 0.0)
+    lagged: Array = before - a * (1.0 - np.exp(-before / a))
+    return lagged
 
-    def even(x: Array) -> Array:
-        within = np.clip(half - x, 0.0, window)
-        out: Array = np.where(x < -half, -x, within**2 / (2.0 * window))
-        return out
 
-    def two(older: float) -> MeanBeyond:
-        between = between_two(window, older)
-
-        def beyond(x: Array) -> Array:
-            newest = np.maximum(older * between - x, 0.0)
-            oldest = np.maximum((older - 1.0) * between - x, 0.0)
-            out: Array = (1.0 - older) * newest + older * oldest
-            return out
-
-        return beyond
-
-    def lagged(x: Array) -> Array:
-        before = np.maximum(lag - x, 0.0)
-        out: Array = before - lag * (1.0 - np.exp(-before / lag))
-        return out
-
+def _shapes(window: float, apart: float, h: Array) -> Array:
+    """(S, 4) shares that add up to one (leaning to nothing), and the shapes that they are of."""
+    less = weight_of_two(window, apart)
     if less <= 0.0:
-        return [(1.0, even)]
+        return np.array([(1.0, EVEN, window, 0.0)])
     newer, older, leaning, late = h.tolist()
-    shares = [
-        (1.0 - newer - older - late, even),
-        (newer, two(less)),
-        (older, two(1.0 - less)),
-        (0.5 * leaning, two(0.25)),
-        (-0.5 * leaning, two(0.75)),
-        (late, lagged),
+
+    def two(share: float, weight: float) -> tuple[float, float, float, float]:
+        return share, TWO, weight, between_two(window, weight)
+
+    shapes = [
+        (1.0 - newer - older - late, EVEN, window, 0.0),
+        two(newer, less),
+        two(older, 1.0 - less),
+        two(0.5 * leaning, 0.25),
+        two(-0.5 * leaning, 0.75),
+        (late, LAGGED, window / SPREAD, 0.0),
     ]
-    return [(share, beyond) for share, beyond in shares if share]
+    return np.array([shape for shape in shapes if shape[0]])

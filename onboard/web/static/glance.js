@@ -31,5 +31,6 @@ function showTrust(trust) {
   const article = byId("glance-trust");
   if (trust.open) tell(article, "Trusted", `${learned}, in ${trust.windows} window${trust.windows === 1 ? "" : "s"}`, "good");
   else if (trust.phase === "ended") tell(article, "Window ended", learned, "");
+  else if (!reasons.length) tell(article, "Not judged yet", learned, "");
   else tell(article, "Not trusted", [...reasons.map(reasonInWords), learned].map((t, i) => (i ? t : capital(t))).join("; "), trust.phase === "suspended" ? "bad" : "warn");
 }

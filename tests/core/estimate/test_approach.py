@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from onboard.core.estimate.approach import Approach, worth
-from onboard.core.estimate.calibration_model import calibration_model
+from onboard.core.estimate.calibration_model import calibration_model, possible
 from onboard.core.estimate.limits import NOT_WORTH
 from onboard.core.estimate.solution import solve
 from onboard.core.maths.blocks import Block
@@ -55,3 +55,18 @@ def test_a_pass_is_worth_a_share_of_what_is_known_and_never_less_than_is_told(kn
     sigma = np.sqrt(np.diag(found.covariance))[[model.index[name] for name in MOVING]]
     assert worth(found, model, (0.0, 0.0)) == pytest.approx((NOT_WORTH * sigma[:2]).tolist())
     assert worth(found, model, (9.0, 8.0, 7.0)) == [9.0, 8.0, 7.0]
+
+
+@pytest.mark.parametrize("wanders", [1e-4, 0.02, 0.5])
+def test_the_heading_goes_to_all_that_is_seen_of_it_whatever_share_the_number_has(wanders):
+    """Number and mean of what wanders, both unknown beside noisy measurements of their sum."""
+    model = calibration_model(Linearisation())
+    i, truth, noise = model.index["heading"], 0.26, 0.03
+    prior = model.prior_sigma[i] ** 2
+    both = np.linalg.inv(np.diag([1.0 / prior, 1.0 / wanders]) + np.ones((2, 2)) / noise**2)
+    number, mean = both @ np.ones(2) * truth / noise**2
+    theta, covariance = model.prior.copy(), np.diag(model.prior_sigma**2)
+    theta[i], covariance[i, i] = number, both[0, 0]
+    seen = possible(Linearisation(), model, (theta, covariance), wanders)
+    assert seen[i] == pytest.approx(number + mean)
+    assert np.array_equal(np.delete(seen, i), np.delete(theta, i))

@@ -23,7 +23,7 @@ from onboard.core.filter.noise import USUAL, NoiseLevels, neighbours
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.readings import reading
 from onboard.core.filter.state import ERRORS, HEADING, MEASURED, RATE, STATES
-from onboard.core.filter.whitening import Uses
+from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.maths.frames import rotation_from_vector
 from tests.core.compiled import both_ways
@@ -275,6 +275,65 @@ def test_epoch_by_epoch_either_way_sees_the_same(engine, held):
         np.testing.assert_allclose(y, x, rtol=0.0, atol=1e-8, equal_nan=True)
 
 
+def kicked(batches):
+    """Flight with much that is in the tail of its distribution, and little that is refused."""
+    out, rng = [], np.random.default_rng(8)
+    for batch in batches:
+        fixes, segment = batch.fixes, batch.segment
+        n, k = len(fixes), len(segment.t_attitude)
+        far = 4.5 * (rng.random((n, 4)) < 0.05)
+        v_n = fixes.v_n + USUAL.velocity * far[:, :3]
+        height = fixes.height + USUAL.height * far[:, 3]
+        moved = 25.0 * USUAL.attitude_white * (rng.random((k, 3)) < 0.05)
+        R = rotation_from_vector(moved) @ segment.R_attitude[:]
+        out.append(
+            replace(
+                batch,
+                fixes=replace(fixes, v_n=v_n, height=height),
+                segment=replace(segment, R_attitude=R),
+            )
+        )
+    return out
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["held", "as it goes"])
+@pytest.mark.parametrize("members", [1, 3])
+@pytest.mark.usefixtures("_preference_kept")
+def test_what_is_in_a_tail_is_so_either_way(engine, monkeypatch, held, members):
+    batches, bank = kicked(engine.batches), (USUAL, *neighbours(USUAL))[:members]
+    first = Pass(engine.model, engine.point, (USUAL,))
+    for batch in engine.batches:
+        through(first, batch, 10.0)
+    known = first.theta, np.linalg.inv(first.uncertainty.matrix)
+    widened, seen = WhiteningFilter._widened, []
+
+    def noted(self, made, z, kinds, white, wider):
+        seen.extend(wider)
+        return widened(self, made, z, kinds, white, wider)
+
+    monkeypatch.setattr(WhiteningFilter, "_widened", noted)
+
+    def sums():
+        seen.clear()
+        made = Pass(engine.model, engine.point, bank)
+        if held:
+            made.hold(*known)
+        results = [through(made, batch, 10.0) for batch in batches]
+        return made, results, list(seen)
+
+    (one, results, by_numpy), (two, others, by_itself) = both_ways(sums)
+    assert {*"vhty"} <= set(by_numpy)
+    assert len(by_itself) < len(by_numpy) / 2  # what a gate may have a say in
+    assert two.sums.rows == one.sums.rows
+    scale, N = relative(one.sums.N)
+    np.testing.assert_allclose(relative(two.sums.N)[1], N, rtol=0.0, atol=1e-8)
+    assert_close(two.sums.b / scale, one.sums.b / scale, 1e-8)
+    np.testing.assert_allclose(two.sums.s, one.sums.s, rtol=1e-8)
+    np.testing.assert_allclose(two.sums.log_det, one.sums.log_det, rtol=1e-8)
+    assert_close(two.bias_b, one.bias_b, 1e-8)
+    assert [b.refused for b in others] == [a.refused for a in results]
+
+
 @pytest.mark.usefixtures("_preference_kept")
 def test_without_numba_numpy_does_it(monkeypatch):
     monkeypatch.delattr(onboard.core.filter, "compiled")
@@ -309,7 +368,7 @@ def test_without_a_place_to_keep_compiled_code_numpy_does_it(monkeypatch):
     def nowhere(*_):
         raise RuntimeError("cannot cache function: no locator available")
 
-    for name in ("compiled", "loops", "motion", "runs"):
+    for name in ("compiled", "loops", "motion", "runs", "tail_loops"):
         monkeypatch.delattr(onboard.core.filter, name)
         monkeypatch.delitem(sys.modules, f"onboard.core.filter.{name}")
     monkeypatch.setattr("numba.core.caching.FunctionCache.__init__", nowhere)

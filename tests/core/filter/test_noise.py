@@ -198,3 +198,11 @@ def test_what_the_heading_has_beyond_its_floor_lasts_as_long_as_was_found(found)
         assert whole**2 * levels.as_seen.heading_time == pytest.approx(power)
         assert levels.as_seen == replace(levels, heading_time=levels.as_seen.heading_time)
     assert levels.as_seen.heading_time == pytest.approx(found, rel=0.02)
+
+
+def test_a_heading_that_seems_worse_than_usual_is_found_anew():
+    assert USUAL.with_usual_heading == USUAL
+    quiet = replace(USUAL, heading=0.8 * USUAL.heading, heading_time=40.0)
+    assert quiet.with_usual_heading == quiet
+    lost = replace(USUAL, heading=0.3, heading_time=150.0, velocity=0.3)
+    assert lost.with_usual_heading == replace(USUAL, velocity=0.3)

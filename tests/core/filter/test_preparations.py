@@ -76,6 +76,21 @@ def test_other_noise_and_so_another_bias_of_the_gyroscope_change_next_to_nothing
     np.testing.assert_allclose(again.bias_b, fresh.bias_b, rtol=0.0, atol=1e-6)
 
 
+def test_what_effects_remember_is_the_same_about_another_linearisation(batches, model, monkeypatch):
+    ready = Preparations(MOST_PREPARED_BYTES)
+    passed(model, batches, NoiseLevels(), ready)
+    point = Linearisation(delay=0.17, window=0.2)
+    monkeypatch.setattr(f"{__name__}.POINT", point)
+    fresh = passed(model, batches, NoiseLevels())
+    asked = []
+    monkeypatch.setattr(AccelerometerHysteresis, "remembers", lambda *a: asked.append(a))
+    there = ready.elsewhere()
+    moved = passed(model, batches, NoiseLevels(), there)
+    assert asked == []
+    assert len(there) == len(batches)
+    assert_same_sums(fresh.sums, moved.sums, 1e-12)
+
+
 def test_what_has_no_room_is_made_anew(batches, model):
     whole = Preparations(MOST_PREPARED_BYTES)
     fresh = passed(model, batches, NoiseLevels(), whole)

@@ -7,7 +7,16 @@ held to.  :func:`~onboard.core.maths.compiling.compiled_loops` is the way in.
 
 from onboard.core.maths.loops.bounded import bounded
 from onboard.core.maths.loops.curves import cubics, dragged, signals, straight, values
-from onboard.core.maths.loops.integrals import OWN, integrals, late, own, seen, spread, twice
+from onboard.core.maths.loops.integrals import (
+    OWN,
+    averaging,
+    integrals,
+    late,
+    own,
+    seen,
+    spread,
+    twice,
+)
 from onboard.core.maths.loops.kalman import kalman_errors
 from onboard.core.maths.loops.nodes import followed, inside, turned_on
 from onboard.core.maths.loops.turns import attitudes
@@ -15,6 +24,7 @@ from onboard.core.maths.loops.turns import attitudes
 __all__ = [
     "OWN",
     "attitudes",
+    "averaging",
     "bounded",
     "cubics",
     "dragged",

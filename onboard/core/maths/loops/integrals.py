@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.compiler import compiled
+from onboard.core.maths.compiler import compiled, part
 
 
 @compiled("void(f8, f8[:,::1], f8[:,::1], f8[:,::1])")
@@ -198,22 +198,62 @@ def spread(
     """
     n, _, m = x.shape
     K, b = velocity.shape
-    turned = np.empty((n, m, 3))
+    turned, of_v, of_p = np.empty((n, 3 * m)), np.empty(3 * m), np.empty(3 * m)
     for i in range(n):
-        for c in range(m):
-            for r in range(3):
-                turned[i, c, r] = (
-                    R[i, r, 0] * x[i, 0, c] + R[i, r, 1] * x[i, 1, c] + R[i, r, 2] * x[i, 2, c]
-                )
+        u, v, w = x[i, 0], x[i, 1], x[i, 2]
+        for r in range(3):
+            d, e, f = R[i, r, 0], R[i, r, 1], R[i, r, 2]
+            row = turned[i, r * m : (r + 1) * m]
+            for c in range(m):
+                row[c] = d * u[c] + e * v[c] + f * w[c]
     for k in range(K):
-        begin, end = max(0, -first[k]), min(b, n - first[k])
-        for c in range(m):
-            a0 = a1 = a2 = b0 = b1 = b2 = 0.0
-            for j in range(begin, end):
-                v, p, y = velocity[k, j], place[k, j], turned[first[k] + j, c]
-                a0, a1, a2 = a0 + v * y[0], a1 + v * y[1], a2 + v * y[2]
-                b0, b1, b2 = b0 + p * y[0], b1 + p * y[1], b2 + p * y[2]
-            for r in range(3):
-                x0, x1, x2 = R_epoch[k, 0, r], R_epoch[k, 1, r], R_epoch[k, 2, r]
-                one[k, r, c] = x0 * a0 + x1 * a1 + x2 * a2
-                two[k, r, c] = x0 * b0 + x1 * b1 + x2 * b2
+        of_v[:] = 0.0
+        of_p[:] = 0.0
+        for j in range(max(0, -first[k]), min(b, n - first[k])):
+            y, weighs, places = turned[first[k] + j], velocity[k, j], place[k, j]
+            for c in range(3 * m):
+                of_v[c] += weighs * y[c]
+                of_p[c] += places * y[c]
+        for r in range(3):
+            d, e, f = R_epoch[k, 0, r], R_epoch[k, 1, r], R_epoch[k, 2, r]
+            for c in range(m):
+                one[k, r, c] = d * of_v[c] + e * of_v[m + c] + f * of_v[2 * m + c]
+                two[k, r, c] = d * of_p[c] + e * of_p[m + c] + f * of_p[2 * m + c]
+
+
+@part
+def _beyond(shapes: Array, x: float) -> float:
+    """What of the shapes' response is beyond a place x, s, less that of the moment itself."""
+    out, ahead = 0.0, max(-x, 0.0)
+    for i in range(len(shapes)):
+        share, kind, a, b = shapes[i, 0], shapes[i, 1], shapes[i, 2], shapes[i, 3]
+        if kind == 0.0:
+            within = min(max(0.5 * a - x, 0.0), a)
+            y = -x if x < -0.5 * a else within * within / (2.0 * a)
+        elif kind == 1.0:
+            y = (1.0 - a) * max(a * b - x, 0.0) + a * max((a - 1.0) * b - x, 0.0)
+        else:
+            before = max(a - x, 0.0)
+            y = before - a * (1.0 - np.exp(-before / a))
+        out += share * (y - ahead)
+    return out
+
+
+@compiled("void(f8[:,::1], f8, f8[:,::1], f8[:,::1])")
+def averaging(since: Array, step: float, shapes: Array, out: Array) -> None:
+    """:func:`onboard.core.model.spread.velocity_weights`, into (K, n).
+
+    Args:
+        since: (K, n) from the epoch to the node, s, in order, a ``step`` apart.
+        step: s.
+        shapes: (S, 4) share of each, its kind (0 even, 1 two moments, 2 lag) and what that asks
+            for.
+        out: written to.
+    """
+    K, n = since.shape
+    for k in range(K):
+        beyond = _beyond(shapes, since[k, 0] - 0.5 * step)
+        for j in range(n):
+            further = _beyond(shapes, since[k, j] + 0.5 * step)
+            out[k, j] = beyond - further
+            beyond = further

@@ -37,7 +37,7 @@ class Gravity(Effect):
         if nodes.P is not None:
             turned: Array = np.einsum("ka,kmab->kmb", _down(nodes), nodes.P)
             return turned[..., None]
-        flat, _ = nodes.segment.attitude_at(nodes.t.ravel())
+        flat, _ = nodes.segment.attitude_at(nodes.t.ravel(), curve=nodes.curve)
         down = flat[:, 2, :].reshape(*nodes.t.shape, 3)
         return down[..., None]
 
@@ -55,6 +55,6 @@ class Gravity(Effect):
 
 def _down(nodes: Signals) -> Array:
     """(K, 3) down at the first of nodes in rows, body axes."""
-    R_nb, _ = nodes.segment.attitude_at(nodes.t[:, 0])
+    R_nb, _ = nodes.segment.attitude_at(nodes.t[:, 0], curve=nodes.curve)
     down: Array = R_nb[:, 2]
     return down
