@@ -55,7 +55,7 @@ def jumped_twice(
     second = _second(full, first)
     if second is None:
         return None
-    first = jump_near(full.carrying(second), (), first.moment, SCAN_S)
+    first = jump_near(full.carrying(second, tuned=False), (), first.moment, SCAN_S)
     if first.name == second.name:
         return None
     wide = Examination(
@@ -82,7 +82,7 @@ def _first(choice: Choice, t0: float) -> BiasStep | None:
 
 def _second(full: Examination, first: BiasStep) -> BiasStep | None:
     """The jump that explains most beside another one, if that is no chance."""
-    with_first = full.carrying(first)
+    with_first = full.carrying(first, tuned=False)
     looked = jumps_anywhere(with_first)
     if not looked:
         return None
