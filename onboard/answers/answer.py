@@ -121,7 +121,7 @@ def judged(diagnosis: Diagnosis, parameters: Mapping[str, float] | None = None) 
         return Answer(_refused(diagnosis))
     diagnosis = _with_what_was_seen(diagnosis)
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
-        found = ", ".join(phrase_of(e) for e in suspects)
+        found = ", ".join(dict.fromkeys(phrase_of(e) for e in suspects))
         missing = "the residual is not noise, and " + (
             f"what was found ({found}) does not explain all of it"
             if found

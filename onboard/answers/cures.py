@@ -94,5 +94,5 @@ def cured(
         settable = values and not against(e, diagnosis, parameters)
         todo.append(f"set {', '.join(values)}" if settable else e.cure)
     said = "; ".join(dict.fromkeys(c for c in todo if c))
-    found = ", ".join(phrase_of(e) for e in effects)
+    found = ", ".join(dict.fromkeys(phrase_of(e) for e in effects))
     return f"{found}; first {said}, then fly again" if said else found

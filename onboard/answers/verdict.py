@@ -68,10 +68,11 @@ def headline(diagnosis: Diagnosis) -> str:
         if changing:  # which is more than that nothing explains it
             return capital(changing[0].split(" (")[0])
         return "Something is missing, and no known effect explains it"
-    titles = [title_of(e.name) for e in named[:MOST_NAMED]]
+    every = list(dict.fromkeys(title_of(e.name) for e in named))  # what comes twice is said once
+    titles = every[:MOST_NAMED]
     # A name that begins with capitals keeps them in the middle of a sentence.
     found = [t if t[:2].isupper() or not k else t[:1].lower() + t[1:] for k, t in enumerate(titles)]
-    more = len(named) - len(titles)
+    more = len(every) - len(titles)
     if diagnosis.verdict is not Verdict.EXPLAINED:
         found.append("something else is missing" if not more else "more is missing")
     elif more:

@@ -185,10 +185,16 @@ class Examination(Engine):
         t0, families = self.point.skew_from, (*self._own, *more)
         return Examination(self, families, t0=t0, start=self, refused=refused, batches=batches)
 
-    def carrying(self, nuisance: Family) -> Examination:
-        """The same flight and columns with a nuisance that whatever follows has to live with."""
+    def carrying(self, nuisance: Family, *, tuned: bool = True) -> Examination:
+        """The same flight and columns with a nuisance that whatever follows has to live with.
+
+        Args:
+            nuisance: columns.
+            tuned: whether noise and timing are found anew beside it.
+        """
         t0 = self.point.skew_from
-        return Examination(self, self._own, t0=t0, start=self, carried=(nuisance,)).with_noise()
+        made = Examination(self, self._own, t0=t0, start=self, carried=(nuisance,))
+        return made.with_noise() if tuned else made.with_rows()
 
     def doubting(self) -> Examination:
         """The same flight and columns with an attitude that is believed as little as may be.

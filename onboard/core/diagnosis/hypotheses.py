@@ -30,7 +30,8 @@ class Choice:
 
     ``jump_from`` (3,) are sizes from which a jump would have been found at half of the moments at
     which it was looked for; None where it was not.  ``common`` is a jump that all accelerometers of
-    the vehicle have made alike, ``undecided`` one that this one has made or another.
+    the vehicle have made alike, ``undecided`` one that this one has made or another, ``tried`` one
+    that was compared with the rest, chosen or not.
     """
 
     fitter: Fitter
@@ -40,6 +41,7 @@ class Choice:
     jump_from: Array | None = None
     common: BiasStep | None = None
     undecided: BiasStep | None = None
+    tried: BiasStep | None = None
 
     @property
     def free(self) -> list[int]:

@@ -40,6 +40,7 @@ from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, only, settled
 from onboard.core.diagnosis.shadows import without_shadows
+from onboard.core.diagnosis.twice import jumped_twice
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.inputs.clock_rates import most_growth
@@ -187,13 +188,21 @@ def _selected(full: Examination, asked: _Asked, origin: Origin) -> tuple[Examina
         seen = placed(full, seen)
         wide, other = _beside(full, asked.testable, choice, seen)
         if any(c.jump for c in other.chosen):
-            return _likelier(full, asked, choice, (wide, other))
+            return _twice(full, asked, _likelier(full, asked, choice, (wide, other)))
         if _nobodys(wide, other, seen):
             undecided, full = seen, full.carrying(halved(seen))
             choice = _chosen(full, asked.testable)
-    full, choice = _by_gps(full, asked, choice)
+    wide, choice = _by_gps(full, asked, choice)
     choice.undecided = undecided
-    return full, choice
+    return (wide, choice) if undecided else _twice(full, asked, (wide, choice))
+
+
+def _twice(
+    full: Examination, asked: _Asked, found: tuple[Examination, Choice]
+) -> tuple[Examination, Choice]:
+    """What was found, or two jumps if the flight had two."""
+    two = jumped_twice(full, asked.testable, found[1], asked.companions, asked.imu)
+    return found if two is None else two
 
 
 def _likelier(
@@ -228,6 +237,7 @@ def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examinati
             common = alike(full, jump, own, choice.fitter.pool.variance)
             wide, other = _with_jump(full, asked.testable, choice, jump if common else own)
             other.common = jump if common and any(c.columns is jump for c in other.chosen) else None
+            other.tried = jump
             return wide, other
         steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
         known = any(shock.name == f.name for f in full.carried)
