@@ -116,6 +116,7 @@ class OrdinaryFlight:
         self._taken = np.empty(n, dtype=np.int64)
         self._states = np.empty((n, 15))
         self._ends = np.ascontiguousarray(ready.measured, dtype=np.int64)
+        self._noted = (self._rows, self._raw, self._log_var, self._taken, self._states)
 
     def go(self, step: int, theta: Array, uncertainty: Uncertainty, most: int) -> Gone:
         """Go on from a step (its number) until ``most`` epochs are taken or one is not ordinary.
@@ -172,11 +173,7 @@ class OrdinaryFlight:
             int(made.uses.earth),
             int(gram is not None),
             np.zeros(3) if gram is None else gram,
-            self._rows,
-            self._raw,
-            self._log_var,
-            self._taken,
-            self._states,
+            *self._noted,
         )
         if pending == _NO_COVARIANCE:
             raise np.linalg.LinAlgError("the covariance of the innovations is not positive")

@@ -1,47 +1,25 @@
 """A receiver that is off by one error for a while is no jump of the accelerometer, nor one it."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from onboard.core.diagnosis.false_velocity import FalseVelocity
-from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Verdict
-from onboard.core.estimate.calibrator import Calibrator
-from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING
-from onboard.core.inputs.samples import EkfHealth
-from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
-from sitl.builtin.truth import GpsTruth, random_imus
-from sitl.recording import FlightSpec, fly_messages
-
-PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
+from sitl.builtin.truth import random_imus
+from sitl.recording import FlightSpec
+from tests.core.diagnosis.complaints import PROMPT, complained
 
 
 def told(vehicle, seed, *effects, complaints=(), duration=150.0):
     """What is said of a flight whose EKF complains of GPS in ``complaints`` and nowhere else, s."""
+    imus = random_imus(seed)
     spec = FlightSpec(
-        vehicle=vehicle,
-        seed=seed,
-        duration=duration,
-        imus=random_imus(seed),
-        gps=PROMPT,
-        effects=effects,
+        vehicle=vehicle, seed=seed, duration=duration, imus=imus, gps=PROMPT, effects=effects
     )
-    made, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
-    for _, message in fly_messages(spec):
-        for sample in decoder.decode(message):
-            if isinstance(sample, EkfHealth):
-                bad = any(a <= sample.t <= b for a, b in complaints)
-                flags = EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0)
-                made.feed(replace(sample, flags=flags))
-            else:
-                made.feed(sample)
-    made.finish()
-    return diagnose(made, 1), made.first_sample
+    return complained(spec, complaints)
 
 
 def test_velocities_are_off_for_as_long_as_it_lasts_and_by_the_same():

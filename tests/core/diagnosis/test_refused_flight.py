@@ -7,30 +7,21 @@ import pytest
 
 from onboard.answers.verdict import headline, unused_in_words
 from onboard.core.diagnosis.coasting import _between_steps
-from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Mismatch, Verdict
-from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.result import Status
-from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.gps.distrust import Distrust
 from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, TrustWindow
 from onboard.core.inputs.samples import EkfHealth, GpsFix
 from onboard.core.physics.effects.gps_latency import GpsLatency
-from onboard.mavlink.decode import Decoder
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import GpsTruth, random_imus
-from sitl.recording import FlightSpec, fly_messages
+from sitl.recording import FlightSpec
+from tests.core.diagnosis.complaints import PROMPT, complained
 
 NOISY = GpsTruth(delay=0.04, stamped_early=0.02, velocity_noise=0.15, velocity_coloured=0.15)
-PROMPT = GpsTruth(delay=0.04, stamped_early=0.02)
 QUIET = NoiseLevels(velocity=0.12, velocity_colour=0.16, force_walk=0.16)
-
-
-def complaining(health, complaints):
-    bad = any(begin <= health.t <= end for begin, end in complaints)
-    return replace(health, flags=EKF_ATTITUDE | (EKF_GPS_GLITCHING if bad else 0))
 
 
 def flagged(seed, gps, complaints, *effects, duration=140.0):
@@ -43,12 +34,7 @@ def flagged(seed, gps, complaints, *effects, duration=140.0):
         gps=gps,
         effects=effects,
     )
-    made, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
-    for _, message in fly_messages(spec):
-        for sample in decoder.decode(message):
-            made.feed(complaining(sample, complaints) if isinstance(sample, EkfHealth) else sample)
-    made.finish()
-    return diagnose(made, 1), made.first_sample
+    return complained(spec, complaints)
 
 
 @pytest.mark.slow
