@@ -1,5 +1,7 @@
 """The same with numpy's arithmetic and with compiled loops."""
 
+import numpy as np
+
 from onboard.core.maths.compiling import compiled_loops, prefer_compiled
 
 
@@ -10,3 +12,8 @@ def both_ways(what):
     prefer_compiled()
     assert compiled_loops() is not None
     return one, what()
+
+
+def assert_close(a, b, tolerance=1e-11):
+    """Equal to a share of the largest."""
+    np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * np.abs(b).max(initial=1.0))

@@ -21,7 +21,7 @@ from onboard.core.diagnosis.limits import (
     MEAN_S,
     SAME,
 )
-from onboard.core.diagnosis.refusals import Refused
+from onboard.core.diagnosis.refusals import Refused, within
 from onboard.core.filter.innovations import Epoch, WhitenedInnovations
 from onboard.core.filter.limits import ATTITUDE_TIME_S, COLOUR_TIME_S, GATE_VELOCITY
 from onboard.core.filter.noise import NoiseLevels
@@ -86,9 +86,10 @@ def contradictions(
     if not doubted:
         return []
     asked, traces = _coasted(full, levels)
-    spans = [full.point.true_time(np.array([r.start, r.end])) for r in doubted]
+    spans = [(r.start, r.end) for r in doubted]
+    inside = within(full.point.stamp(np.array([a.t for a in asked])), spans)
     out = []
-    for group in _groups([a for a in asked if _within(a.t, spans)]):
+    for group in _groups([a for a, is_in in zip(asked, inside, strict=True) if is_in]):
         flown = _with_before(group, traces)
         y, S, anchored = _bridged(group, traces)
         found = _between_steps(flown, levels, anchored=anchored)
@@ -96,10 +97,6 @@ def contradictions(
             found = [*_runs([a.t for a in group], y, S, levels.velocity)]
         out += found
     return out
-
-
-def _within(t: float, spans: Sequence[Array]) -> bool:
-    return any(a - 1e-3 <= t <= b + 1e-3 for a, b in spans)
 
 
 def _coasted(full: Examination, levels: NoiseLevels) -> tuple[list[Asked], Traces]:

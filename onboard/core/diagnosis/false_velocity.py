@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.diagnosis.examination import VELOCITY, Examination
-from onboard.core.diagnosis.faults import earth_axis, fault_of, within
+from onboard.core.diagnosis.faults import earth_axis, fault_of
 from onboard.core.diagnosis.limits import LARGEST_FALSE, MEAN_S
 from onboard.core.diagnosis.refusals import Refused as Doubted
+from onboard.core.diagnosis.refusals import within
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.filter.refused import Refused
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
@@ -140,12 +141,9 @@ def sized(fault: Finding, made: AsFault, t0: float) -> Finding:
 
 def heard(batches: Sequence[Batch], doubted: Sequence[Doubted]) -> list[Batch]:
     """The flight with the velocities believed that others doubted (stamps, s on the boot clock)."""
-    out = []
+    out, spans = [], [(span.start, span.end) for span in doubted]
     for batch in batches:
-        t = batch.fixes.t
-        inside = np.zeros(len(t), dtype=bool)
-        for span in doubted:
-            inside |= (t >= span.start) & (t <= span.end)
+        inside = within(batch.fixes.t, spans)
         inside &= np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
         out.append(replace(batch, trusted=batch.trusted | inside))
     return out

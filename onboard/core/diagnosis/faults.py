@@ -17,6 +17,7 @@ from onboard.core.diagnosis.limits import (
     OFF,
     SAME,
 )
+from onboard.core.diagnosis.refusals import within
 from onboard.core.diagnosis.regimes import spans
 from onboard.core.filter.traces import Traces
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
@@ -25,8 +26,6 @@ from onboard.core.maths.arrays import Array
 from onboard.core.physics.effects.gps_fault import GpsFault
 from onboard.core.physics.finding import Finding, Quantity
 
-TO_THE_FIX_S = 1e-3
-"""s by which the ends of an interval, which are those of fixes, are read further."""
 ONSET = FEWEST_FIXES // 2 + 1
 """Fixes that show how a fault began: most of those that it has at least."""
 
@@ -52,8 +51,7 @@ def fault_effect(
             fault where the inertia, lost itself, cannot tell.
         contradicted: fixes refused in flight that the inertia has contradicted; not in ``traces``.
     """
-    refused = {float(traces.t[i]): by[:2] for i, by in traces.refused_by.items()}
-    seen = {**_heard_beside(traces), **refused}
+    refused, seen = _innovations(traces)
     every = [_spell(run, seen, t0, least, coast_s) for run in _runs(traces, refused)]
     spells = [s for s in _paired(every, _jumps(seen, refused, t0)) if not s.lost]
     spells = _with_contradicted(spells, contradicted, t0)
@@ -69,7 +67,7 @@ def fault_effect(
 
 
 def suspected(traces: Traces, t0: float) -> list[tuple[float, float]]:
-    """From where to where a receiver may have been off by less than no honest one is, s.
+    """From where to where a receiver may have been off by what is no fault by itself, s.
 
     A filter is used to a small error after a few fixes.  What speaks for one is that it is taken
     back: refused velocities at both ends that are off to opposite sides.
@@ -78,8 +76,7 @@ def suspected(traces: Traces, t0: float) -> list[tuple[float, float]]:
         traces: of every epoch, with innovations as the flight was found to be.
         t0: s on the boot clock.
     """
-    refused = {float(traces.t[i]): by[:2] for i, by in traces.refused_by.items()}
-    seen = {**_heard_beside(traces), **refused}
+    refused, seen = _innovations(traces)
     left = [_spell(run, seen, t0, 0.0, np.inf) for run in _runs(traces, refused)]
     out: list[tuple[float, float]] = []
     while left:
@@ -113,14 +110,6 @@ def fault_of(
         where=spans(batches, t0, intervals, axis),
         intervals=tuple(intervals),
     )
-
-
-def within(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
-    """(n,) whether times are in one of the intervals."""
-    inside = np.zeros(len(t), dtype=bool)
-    for a, b in intervals:
-        inside |= (t >= a - TO_THE_FIX_S) & (t <= b + TO_THE_FIX_S)
-    return inside
 
 
 def _with_contradicted(
@@ -187,6 +176,12 @@ def _bad(traces: Traces) -> NDArray[np.bool_]:
     bad = np.zeros(len(traces), dtype=bool)
     bad[[i for i, names in traces.refused.items() if "velocity" in names]] = True
     return bad
+
+
+def _innovations(traces: Traces) -> tuple[dict[float, Array], dict[float, Array]]:
+    """Those (2,) of refused velocities by their times; and with those taken right beside one."""
+    refused = {float(traces.t[i]): by[:2] for i, by in traces.refused_by.items()}
+    return refused, {**_heard_beside(traces), **refused}
 
 
 def _heard_beside(traces: Traces) -> dict[float, Array]:

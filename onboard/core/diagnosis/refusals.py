@@ -11,13 +11,16 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from onboard.core.diagnosis.limits import SAME_FIX_S
 from onboard.core.diagnosis.records import Unused
+from onboard.core.filter.refused import PER_SECOND
 from onboard.core.filter.refused import Refused as RefusedVelocities
 from onboard.core.gps.distrust import Distrust, RefusedFixes
 from onboard.core.inputs.limits import LONGEST_FIX_GAP_S
 from onboard.core.inputs.segments import Batch
+from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import Finding
 
 LONG_S: Final = 5.0
@@ -44,6 +47,15 @@ class Refused:
     start: float
     end: float
     reason: Distrust
+
+
+def within(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    """(n,) whether times are in one of the intervals, whose ends are those of fixes."""
+    to_the_fix = 1.0 / PER_SECOND
+    inside = np.zeros(len(t), dtype=bool)
+    for a, b in intervals:
+        inside |= (t >= a - to_the_fix) & (t <= b + to_the_fix)
+    return inside
 
 
 def refused(batches: Sequence[Batch], refusals: Sequence[RefusedFixes]) -> list[Refused]:

@@ -15,9 +15,9 @@ import numpy as np
 from onboard.core.diagnosis.coasting import Contradiction, contradictions
 from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.faults import fault_effect, fault_of, suspected, within
+from onboard.core.diagnosis.faults import fault_effect, fault_of, suspected
 from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
-from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused
+from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused, within
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.going_through import through
@@ -82,11 +82,11 @@ def false_fixes(
 ) -> tuple[Finding | None, bool]:
     """GPS velocities that cannot be true, or may not be.
 
-    Returns:
-        A fault, if there may be one; and whether there is, whatever the likelihood of the flight.
-
     Noise levels that were found with the false ones among the rest would let them pass: the
     filter that judges uses what most fixes say of the noise.
+
+    Returns:
+        A fault, if there may be one; and whether there is, whatever the likelihood of the flight.
     """
     doubted = doubted_of(calibrator, full)
     levels, least, jumped = _robust(full, full.found().theta)
