@@ -12,15 +12,13 @@ from onboard.core.diagnosis.coarse_readings import coarse_of
 from onboard.core.diagnosis.effort import WORTH_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
-from onboard.core.diagnosis.fault_or_jump import fault_or_jump
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
-from onboard.core.diagnosis.screening import doubted_of, false_fixes, unbelieved, unclipped
+from onboard.core.diagnosis.screening import false_fixes, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
-from onboard.core.filter.refused import Refused
 from onboard.core.inputs.expected_force import drowned, expected, spectrum, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
@@ -102,22 +100,16 @@ def cleared(
     fault: Finding | None = None
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
-        fault, sure = false_fixes(calibrator, engine, full, origin.t0)
+        fault = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
-        doubted = doubted_of(calibrator, full)
-        told = fault_or_jump(full, fault, origin.t0, doubted, sure=sure)
-        fault = told if isinstance(told, Finding) else None
-        if told is not None:
-            batches = full.batches if fault is None else unbelieved(full, fault, origin.t0)
-            full = Examination(
-                engine,
-                testable,
-                t0=origin.t0,
-                batches=batches,
-                start=full,
-                refused=told if isinstance(told, Refused) else None,
-                carried=carried,
-            ).with_noise()
+        full = Examination(
+            engine,
+            testable,
+            t0=origin.t0,
+            batches=unbelieved(full, fault, origin.t0),
+            start=full,
+            carried=carried,
+        ).with_noise()
     full.let_epochs_go()
     said = None if coarse is None else coarse.finding
     return Cleared(full, testable, absent, rail, fault, spikes, said, clipped, sampled)

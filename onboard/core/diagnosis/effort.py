@@ -40,3 +40,7 @@ after 35 s, for the likeliest gyroscope is quiet)."""
 MOST_PARTS: Final = 128
 """Parts of a flight, at the most, in which its constants are asked to be the same: of 24 minutes
 every block."""
+MOST_EDGES: Final = 14
+"""Moments at which a receiver's error begins, changes or ends."""
+CREEPS_S: Final = (2.0, 3.0, 4.0, 5.0, 7.0, 9.0, 13.0, 17.0, 23.0, 32.0, 44.0, 60.0)
+"""s over which an error of a receiver may have grown: an EKF takes what grows slower for true."""

@@ -62,7 +62,7 @@ class Examination(Engine):
         """
         inherited = like.carried if isinstance(like, Examination) else ()
         self.carried: tuple[Family, ...] = (*inherited, *carried)
-        self._own = tuple(families)
+        self.families = tuple(families)
         origin = start or like
         point = replace(point or origin.point, skew_from=t0)
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
@@ -124,7 +124,7 @@ class Examination(Engine):
         where = self.model.slices
         rivals = [
             i
-            for f in self._own
+            for f in self.families
             if isinstance(f, Effect) and f.trades
             for i in range(self.model.size)[where[f.name]]
         ]
@@ -182,7 +182,7 @@ class Examination(Engine):
             refused: velocities that are not to be used; None: what the gates refuse.
             batches: the flight with other fixes believed; None: as here.
         """
-        t0, families = self.point.skew_from, (*self._own, *more)
+        t0, families = self.point.skew_from, (*self.families, *more)
         return Examination(self, families, t0=t0, start=self, refused=refused, batches=batches)
 
     def carrying(self, nuisance: Family, *, tuned: bool = True) -> Examination:
@@ -193,7 +193,7 @@ class Examination(Engine):
             tuned: whether noise and timing are found anew beside it.
         """
         t0 = self.point.skew_from
-        made = Examination(self, self._own, t0=t0, start=self, carried=(nuisance,))
+        made = Examination(self, self.families, t0=t0, start=self, carried=(nuisance,))
         return made.with_noise() if tuned else made.with_rows()
 
     def doubting(self) -> Examination:
@@ -202,7 +202,7 @@ class Examination(Engine):
         An EKF levels with the accelerometer that is examined: what changes the accelerometer's
         offset in flight tilts the recorded attitude too, for as long as the EKF needs to learn it.
         """
-        made = Examination(self, self._own, t0=self.point.skew_from, start=self, traced=False)
+        made = Examination(self, self.families, t0=self.point.skew_from, start=self, traced=False)
         made.noise = replace(self.noise, attitude=LIMITS["attitude"][1])
         made.once()
         return made
@@ -213,7 +213,7 @@ class Examination(Engine):
         What is one number for a flight cannot be told from an error that is another one after
         minutes, and the time after which it is another one is no such thing at a floor.
         """
-        made = Examination(self, self._own, t0=self.point.skew_from, start=self)
+        made = Examination(self, self.families, t0=self.point.skew_from, start=self)
         made.noise = self.noise.as_seen
         made.once()
         return made

@@ -65,24 +65,14 @@ MARGIN_S: Final = 0.4
 """s to either side of clipped flight that go with it: a low-pass of 5 Hz rings so long
 [physics]."""
 
-# False fixes (screening, faults, coasting, refusals).
+# False fixes (false_stretches, receiver_errors, refusals).
 
-OFF: Final = 8.0
-"""Times the receiver's noise that no honest velocity is off, again and again [tuned]."""
-FAULT_M_S: Final = 0.7
-"""m/s by which fixes must contradict dead reckoning: less is an ordinary receiver's [tuned]."""
-MEAN_S: Final = 1.0
-"""s that a fault lasts at least, and over which fixes are averaged against dead reckoning: a gust
-or a bump is over by then [tuned]."""
-FEWEST_FIXES: Final = 5
-"""Fixes from which dead reckoning can be compared [tuned]."""
-SAME: Final = 0.5
-"""Share of its size by which an error may change and be the same error [tuned]."""
 LARGEST_FALSE: Final = 10.0
 """m/s by which a velocity is false, one sigma: as fast as these vehicles fly, for what is told is
 where it was, or is, or nothing [physics]."""
-LONGEST_FAULT_S: Final = 120.0
-"""s; what lasts longer is how the receiver is [tuned]."""
+NEAR_S: Final = 10.0
+"""s to either side of an error in which a receiver is as noisy as it is there [physics: satellites
+come into sight and go as a vehicle turns, in seconds]."""
 SAME_FIX_S: Final = 0.1
 """s within which a stamp of the trust window and one of a batch are the same fix: the jitter of
 stamps [physics]."""

@@ -9,25 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import log
 
 import numpy as np
 
-from onboard.core.diagnosis.coasting import Contradiction, contradictions
-from onboard.core.diagnosis.effort import SHORTEST_S
+from onboard.core.diagnosis.effort import SEARCHED, SHORTEST_S
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.faults import fault_effect, fault_of, suspected
-from onboard.core.diagnosis.limits import FAULT_M_S, MARGIN_S, OFF
+from onboard.core.diagnosis.faults import fault_effect
+from onboard.core.diagnosis.limits import MARGIN_S
+from onboard.core.diagnosis.receiver_errors import Looking
 from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused, within
+from onboard.core.diagnosis.score import surprise
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.going_through import through
 from onboard.core.estimate.limits import DELAY_RANGE_S
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.passes import Pass
-from onboard.core.filter.traces import Traces, residual
+from onboard.core.filter.traces import residual
 from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.segments import Batch
-from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import Finding
 
 
@@ -79,37 +78,31 @@ def doubted_of(calibrator: Calibrator, full: Examination) -> list[Refused]:
 
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
-) -> tuple[Finding | None, bool]:
-    """GPS velocities that cannot be true, or may not be.
+) -> Finding | None:
+    """GPS velocities that cannot be true.
 
-    Noise levels that were found with the false ones among the rest would let them pass: the
-    filter that judges uses what most fixes say of the noise.
-
-    Returns:
-        A fault, if there may be one; and whether there is, whatever the likelihood of the flight.
+    Those that others doubted in flight are asked, too: that was an opinion.  Noise levels that were
+    found with the false ones among the rest would let them pass: what most fixes say of the noise
+    is what they are judged by.
     """
     doubted = doubted_of(calibrator, full)
-    levels, least, jumped = _robust(full, full.found().theta)
+    noise, suspicious = _of_most(full)
     full.let_epochs_go()
-    every = (full.refused, full.refused_untuned, like.refused)
-    rejected = any(refused["velocity"] for refused in every)
-    if not rejected and not jumped and not doubted:
-        return None, False
-    contradicted = contradictions(full, levels, doubted)
-    traces = _asked_again(full, levels, contradicted, again=bool(doubted))
-    fault = fault_effect(
-        traces,
-        full.batches,
-        t0,
-        least,
-        full.settings.coast_s,
-        _distrusted(calibrator, full, t0),
-        contradicted,
-    )
-    if fault is not None:
-        return fault, True
-    spans = suspected(traces, t0)
-    return (fault_of(full.batches, t0, spans, None, "") if spans else None), False
+    refused = (full.refused, full.refused_untuned, like.refused)
+    if not (suspicious or doubted or any(by["velocity"] for by in refused)):
+        return None
+    errors = Looking(full, heard(full.batches, doubted), noise).errors()
+    return fault_effect(errors, _distrusted(calibrator, full, t0), full.batches, t0)
+
+
+def heard(batches: Sequence[Batch], doubted: Sequence[Refused]) -> list[Batch]:
+    """The flight with the velocities believed that others doubted (stamps, s on the boot clock)."""
+    out, stretches = [], [(r.start, r.end) for r in doubted]
+    for batch in batches:
+        inside = within(batch.fixes.t, stretches)
+        inside &= np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
+        out.append(replace(batch, trusted=batch.trusted | inside))
+    return out
 
 
 def unbelieved(full: Examination, fault: Finding, t0: float) -> list[Batch]:
@@ -119,35 +112,6 @@ def unbelieved(full: Examination, fault: Finding, t0: float) -> list[Batch]:
         bad = within(full.point.true_time(batch.fixes.t) - t0, fault.intervals)
         out.append(replace(batch, trusted=batch.trusted & ~bad))
     return out
-
-
-def _asked_again(
-    full: Examination, levels: NoiseLevels, known: Sequence[Contradiction], *, again: bool
-) -> Traces:
-    """Epochs of a pass whose gates judge every fix, their innovations with what was found.
-
-    With ``again`` also those refused in flight.  Not those that are ``known`` to be false: a filter
-    would take them for true in the end.
-    """
-    solution = full.found()
-    made = Pass(
-        full.model,
-        full.point,
-        (levels,),
-        uses=full.uses,
-        traces=True,
-        theta=solution.theta,
-        covariance=solution.covariance,
-    )
-    traces = Traces(sum(len(b.fixes) for b in full.batches))
-    for batch in full.batches:
-        asked = batch
-        if again:
-            heard = np.all(np.isfinite(batch.fixes.v_n[:, :2]), axis=1)
-            t = full.point.true_time(batch.fixes.t)
-            asked = replace(batch, trusted=heard & ~within(t, [(c.start, c.end) for c in known]))
-        traces.extend(through(made, asked, full.settings.coast_s).traces.at(solution.theta))
-    return traces
 
 
 def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tuple[float, float]]:
@@ -166,24 +130,21 @@ def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tu
     return [(float(a) - t0, float(b) - t0) for a, b in spans if b - a > 1.0]
 
 
-def _robust(full: Examination, theta: Array) -> tuple[NoiseLevels, float, bool]:
-    """What most fixes say of the receiver, for false ones are few.
+def _of_most(full: Examination) -> tuple[NoiseLevels, bool]:
+    """Noise levels of the receiver by most of its fixes; whether any is off by what is no chance.
 
-    Returns:
-        Noise levels; the error (m/s) that no honest fix has; whether any is far off.
+    The median of what they are off by does not know of a few that are false.
     """
-    traces = full.traces
+    traces, noise = full.traces, full.noise
     seen = traces.velocities > 0
     if not seen.any():
-        return full.noise, FAULT_M_S, False
-    off = np.abs(residual(traces.innovation, traces.columns, theta)[seen, :2])
-    usual = 1.4826 * float(np.median(off))
-    noise, floor = full.noise, NoiseLevels()
+        return noise, False
+    off = residual(traces.innovation, traces.columns, full.found().theta)[seen, :2]
+    usual = 1.4826 * float(np.median(np.abs(off)))
+    largest, floor = float(np.max(np.sum(off**2, axis=1))), NoiseLevels()
     levels = replace(
         noise,
         velocity=min(noise.velocity, max(floor.velocity, 2.0 * usual)),
         velocity_colour=min(noise.velocity_colour, max(floor.velocity_colour, 2.0 * usual)),
     )
-    spread = max(float(np.hypot(levels.velocity, levels.velocity_colour)), usual)
-    least = max(FAULT_M_S, OFF * spread)
-    return levels, least, float(off.max()) > max(FAULT_M_S, OFF * usual)
+    return levels, surprise(largest / usual**2, 2, len(off)) > -2.0 * log(SEARCHED)

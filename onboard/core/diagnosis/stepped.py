@@ -150,7 +150,7 @@ class JumpingPass(Pass):
     """
 
     def __init__(self, full: Examination, model: Model) -> None:
-        theta, covariance = _known(full, model)
+        theta, covariance = known_without(full, model)
         uses = Uses(height=full.uses.height)
         super().__init__(
             model, full.point, (full.noise,), uses=uses, theta=theta, covariance=covariance
@@ -189,7 +189,7 @@ def jumping(ready: Prepared, jumps: Sequence[tuple[int, float]], R_bs: Array) ->
         steps.columns[:, 3:6, at] = left**2 * stays[:, 3:6]
 
 
-def _known(full: Examination, model: Model) -> tuple[Array, Array]:
+def known_without(full: Examination, model: Model) -> tuple[Array, Array]:
     """What the sums of ``full`` say of the unknowns of another model, (m,) and (m, m).
 
     Of those that it has, without the rest of its own; of others nothing is known.

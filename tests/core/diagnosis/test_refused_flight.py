@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from onboard.answers.verdict import headline, unused_in_words
-from onboard.core.diagnosis.coasting import _between_steps
 from onboard.core.diagnosis.records import Mismatch, Verdict
 from onboard.core.estimate.gps_clock import FixClock
 from onboard.core.estimate.result import Status
-from onboard.core.filter.noise import NoiseLevels
 from onboard.core.gps.distrust import Distrust
 from onboard.core.gps.trust import EKF_ATTITUDE, EKF_GPS_GLITCHING, TrustWindow
 from onboard.core.inputs.samples import EkfHealth, GpsFix
@@ -21,7 +19,6 @@ from sitl.recording import FlightSpec
 from tests.core.diagnosis.complaints import PROMPT, complained
 
 NOISY = GpsTruth(delay=0.04, stamped_early=0.02, velocity_noise=0.15, velocity_coloured=0.15)
-QUIET = NoiseLevels(velocity=0.12, velocity_colour=0.16, force_walk=0.16)
 
 
 def flagged(seed, gps, complaints, *effects, duration=140.0):
@@ -79,39 +76,6 @@ def test_a_complaint_that_nothing_bears_out_is_said_and_the_flight_is_not_bare_c
     (sentence,) = unused_in_words(said)
     assert "the autopilot reports a GPS glitch" in sentence
     assert "nothing there contradicts GPS" in sentence
-
-
-def innovations(*stages):
-    """Times and innovations: each stage has its length, s, its error, and its drift, m/s/s."""
-    rng = np.random.default_rng(7)
-    errors = [np.tile(error, (round(5 * s), 1)) for s, error, _ in stages]
-    drift = np.cumsum(np.concatenate([np.full(round(5 * s), 0.2 * d) for s, _, d in stages]))
-    y = np.concatenate(errors) + drift[:, None] * np.array([1.0, 0.0])
-    return 0.2 * np.arange(len(y)), y + 0.1 * rng.standard_normal(y.shape)
-
-
-NONE, OFF = np.zeros(2), np.array([1.2, -0.9])
-
-
-def test_an_error_is_what_the_velocity_jumps_by_however_far_the_inertia_has_drifted():
-    flown = innovations((5.0, NONE, 0.0), (33.0, OFF, -0.1), (8.0, NONE, -0.1))
-    (found,) = _between_steps(flown, QUIET, anchored=True)
-    assert (found.start, found.end) == pytest.approx((5.0, 38.0), abs=0.5)
-    assert found.off == pytest.approx(OFF, abs=3.0 * found.sigma)
-
-
-def test_one_that_crept_in_is_counted_back_from_where_gps_is_right_again():
-    creeping = [(1.0, 0.1 * k * OFF, 0.0) for k in range(10)]
-    flown = innovations(*creeping, (20.0, OFF, 0.0), (8.0, NONE, 0.0))
-    (found,) = _between_steps(flown, QUIET, anchored=True)
-    assert found.end == pytest.approx(30.0, abs=0.5)
-    assert found.size == pytest.approx(1.5, abs=3.0 * found.sigma)
-
-
-@pytest.mark.parametrize("drift", [0.3, 2.0, 5.0])
-def test_what_only_grows_is_the_inertias_own(drift):
-    flown = innovations((5.0, NONE, 0.0), (20.0, NONE, drift))
-    assert _between_steps(flown, QUIET, anchored=False) == []
 
 
 def test_the_window_remembers_when_it_refused_and_why():

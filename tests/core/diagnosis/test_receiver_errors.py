@@ -1,11 +1,8 @@
-"""A receiver that is off by one error for a while is no jump of the accelerometer, nor one it."""
-
-from types import SimpleNamespace
+"""A receiver that is off for a while: when, by what, and that it is no jump of the accelerometer."""
 
 import numpy as np
 import pytest
 
-from onboard.core.diagnosis.false_velocity import FalseVelocity
 from onboard.core.diagnosis.records import Verdict
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
@@ -20,15 +17,6 @@ def told(vehicle, seed, *effects, complaints=(), duration=150.0):
         vehicle=vehicle, seed=seed, duration=duration, imus=imus, gps=PROMPT, effects=effects
     )
     return complained(spec, complaints)
-
-
-def test_velocities_are_off_for_as_long_as_it_lasts_and_by_the_same():
-    t = np.array([1.0, 2.0, 3.0, 4.0])
-    around = SimpleNamespace(now=SimpleNamespace(t=t))
-    ned = FalseVelocity(2.0, 3.0).velocity(around).ned
-    assert ned.shape == (4, 3, 2)
-    assert np.array_equal(ned[1:3] @ [1.4, -0.3], [[1.4, -0.3, 0.0]] * 2)
-    assert not ned[[0, 3]].any()
 
 
 @pytest.mark.slow
@@ -97,3 +85,61 @@ def test_a_fault_beside_a_jump_is_said_beside_it():
     assert set(effects) == {"bias_step", "gps_fault"}
     offset = effects["gps_fault"].unknowns["offset"]
     assert offset.value == pytest.approx(np.hypot(1.2, 1.1), abs=3.0 * offset.sigma)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", ["copter", "plane"])
+def test_an_error_that_grows_in_steps_is_told_by_its_last(vehicle):
+    steps = [(60.0, 0.9, -0.7), (67.0, 1.1, 0.4), (73.0, -0.5, 1.2)]
+    faults = [concealed.GpsFault(start=t, end=80.0, north=n, east=e) for t, n, e in steps]
+    said, first = told(vehicle, 4715, *faults)
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    ((begin, end),) = effect.intervals
+    assert (begin + first, end + first) == pytest.approx((60.0, 80.0), abs=0.5)
+    offset = effect.unknowns["offset"]
+    sizes = [np.hypot(*np.sum([s[1:] for s in steps[: k + 1]], axis=0)) for k in range(3)]
+    assert offset.value == pytest.approx(max(sizes), abs=3.0 * offset.sigma)
+
+
+@pytest.mark.slow
+def test_two_errors_that_take_each_other_back_are_two_and_the_receiver_is_right_between():
+    faults = [
+        concealed.GpsFault(start=50.0, end=59.0, north=1.1, east=0.8),
+        concealed.GpsFault(start=80.0, end=90.0, north=-1.1, east=-0.8),
+    ]
+    said, first = told("copter", 4716, *faults)
+    (effect,) = said.effects
+    seen = [(a + first, b + first) for a, b in effect.intervals]
+    assert np.allclose(seen, [(50.0, 59.0), (80.0, 90.0)], atol=0.5)
+
+
+@pytest.mark.slow
+def test_an_error_that_creeps_in_ends_where_the_receiver_jumps_back():
+    faults = [
+        concealed.GpsFault(start=60.0 + 0.2 * k, end=75.0, north=-0.03, east=0.02)
+        for k in range(70)
+    ]
+    said, first = told("plane", 4717, *faults)
+    (effect,) = said.effects
+    assert effect.name == "gps_fault"
+    ((_, end),) = effect.intervals
+    assert end + first == pytest.approx(75.0, abs=0.5)
+    offset = effect.unknowns["offset"]
+    # What a filter takes for a velocity while it grows is not in what it jumps back by.
+    assert offset.value == pytest.approx(70 * np.hypot(0.03, 0.02), rel=0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [4718, 4719])
+def test_fixes_that_are_off_one_by_one_are_no_fault(seed):
+    """Each second of a minute one fix is off, by something else: that is what gates are for."""
+    rng = np.random.default_rng(seed)
+    faults = [
+        concealed.GpsFault(
+            start=50.0 + k, end=50.05 + k, north=rng.normal(0.0, 1.5), east=rng.normal(0.0, 1.5)
+        )
+        for k in range(60)
+    ]
+    said, _ = told("copter", seed, *faults)
+    assert not any(effect.name == "gps_fault" for effect in said.effects)

@@ -1,0 +1,207 @@
+"""Velocities of a receiver that are false for a while: where an error begins, changes and ends.
+
+A velocity that begins to be false jumps, as no inertia can, and jumps back when it is true again.
+So moments at which it jumps are looked for first, among the fixes that are no chance beside those
+before them.  Between two of them the receiver is right, or off by one error; or by one that has
+crept in until the second.  No gate is asked, for a filter gets used to what is false for long.
+
+That velocities are off each by something else has its own price, and gates that refuse them.  So an
+error is one that lasts, and explains more than chance where the receiver is as noisy as there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import log
+
+import numpy as np
+
+from onboard.core.diagnosis.effort import CREEPS_S, FURTHEST, MOST_EDGES, SEARCHED
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.false_stretches import Stretch, Stretches, VelocityJumps
+from onboard.core.diagnosis.limits import CONTACT_S, NEAR_S
+from onboard.core.diagnosis.score import needed, surprise
+from onboard.core.diagnosis.selection import Fitter
+from onboard.core.diagnosis.stepped import known_without
+from onboard.core.diagnosis.tiles import UNGATED, D, Tile, Tiled
+from onboard.core.estimate.calibration_model import calibration_model
+from onboard.core.estimate.going_through import through
+from onboard.core.filter.limits import ANYTHING, GATE_VELOCITY
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.passes import Pass
+from onboard.core.inputs.segments import Batch
+from onboard.core.maths.arrays import Array
+
+
+@dataclass(frozen=True, slots=True)
+class ReceiverError:
+    """Velocities that are false from one fix to another, s on the boot clock.
+
+    Attributes:
+        start: s, first fix that is false.
+        end: s, last one.
+        off: (3,) north, east, down, m/s; of an error that has crept in, where it ends.
+        sigma: of its size, m/s.
+    """
+
+    start: float
+    end: float
+    off: Array
+    sigma: float
+
+    @property
+    def size(self) -> float:
+        """m/s."""
+        return float(np.linalg.norm(self.off))
+
+
+class Looking:
+    """Looks for errors of the receiver in one flight."""
+
+    def __init__(self, full: Examination, batches: Sequence[Batch], noise: NoiseLevels) -> None:
+        """Take the flight.
+
+        Args:
+            full: with every column, its sums made.
+            batches: the flight with all fixes believed that are asked.
+            noise: levels, of the receiver where it is right.
+        """
+        self._full, self._batches, self._noise = full, batches, noise
+        self._variance = Fitter(full.all_blocks, full.model, full.absent).pool.variance
+        self._fixes = np.unique(np.concatenate([full.point.true_time(b.fixes.t) for b in batches]))
+        # It may begin and end at any fix.
+        self._chance = needed(D, 0.5 * len(self._fixes) ** 2, self._variance)
+
+    def errors(self) -> tuple[ReceiverError, ...]:
+        """Those that are no chance, in order of time."""
+        found: tuple[Stretch, ...] = ()
+        moments: list[float] = []
+        left = self._left(found)
+        for _ in range(FURTHEST):
+            new = [t for t in left.surprising if t not in moments]
+            if not new or len(moments) >= MOST_EDGES:
+                break
+            moments = [*moments, *new][:MOST_EDGES]
+            found = self._between(self._jumps(moments, found))
+            left = self._left(found) if found else left
+        return tuple(self._told(x) for x in found if self._lasts(x, left))
+
+    def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
+        """When velocities jump, s: a tile for each fix about some moments, the flight between."""
+        fixes = self._fixes
+        between = np.concatenate(
+            [[fixes[0] - 1.0], 0.5 * (fixes[1:] + fixes[:-1]), [fixes[-1] + 1.0]]
+        )
+        about = np.searchsorted(fixes, moments)[:, None] + np.arange(-1, 3)
+        ends = np.searchsorted(between, [t for x in known for t in (x.tile.begin, x.tile.end)])
+        every = np.unique([*about.ravel(), *ends, 0, len(fixes)])
+        edges = between[every[(every >= 0) & (every <= len(fixes))]]
+        tiles = [Tile(a, b) for a, b in pairwise(edges.tolist())]
+        seem = _sum_at(0.5 * (edges[1:] + edges[:-1]), known)
+        found: list[float] = edges[VelocityJumps(self._tiled(tiles, seem)).found()].tolist()
+        return found
+
+    def _between(self, jumps: Sequence[float]) -> tuple[Stretch, ...]:
+        """Errors that begin and end where velocities jump, s; the others crept in until then."""
+        first, last = self._fixes[0] + CONTACT_S, self._fixes[-1] - CONTACT_S
+        # While the ground may be touched, it may be a shock that a velocity jumps by.
+        inside = [t for t in jumps if first < t < last]
+        closed = self._chosen([Tile(a, b) for a, b in pairwise(inside)])
+        ends = {t for x in closed for t in (x.tile.begin, x.tile.end)}
+        crept = [
+            Tile(t - span, t, crept=True)
+            for t in inside
+            for span in CREEPS_S
+            if t not in ends and not any(t - span < u < t for u in (self._fixes[0], *jumps))
+        ]
+        return self._chosen([*(x.tile for x in closed), *crept]) if crept else closed
+
+    def _chosen(self, tiles: Sequence[Tile]) -> tuple[Stretch, ...]:
+        """Of errors that there may be, those that there are."""
+        if not tiles:
+            return ()
+        return Stretches(self._tiled(tiles), self._chance, self._variance).chosen()
+
+    def _tiled(self, tiles: Sequence[Tile], seem: Array | None = None) -> Tiled:
+        return Tiled(self._full, self._batches, self._noise, tiles, seem)
+
+    def _lasts(self, found: Stretch, left: _Left) -> bool:
+        """Whether an error is one of many fixes, and no chance where the receiver is noisy.
+
+        What is off by itself is what gates are for, and what is off for most of the flight is how
+        the receiver is.
+        """
+        fixes = len(self._false(found.tile))
+        sigma = float(np.hypot(self._noise.velocity, self._noise.velocity_colour))
+        # What twice the log-likelihood falls by if each may be anything.
+        refused = fixes * (ANYTHING["vvv"] - D * (2.0 * log(sigma) + 1.0))
+        enough = max(left.variance(found.tile), 1.0) * self._chance
+        return 1 < fixes < 0.5 * len(self._fixes) and min(found.gain, refused) > enough
+
+    def _false(self, tile: Tile) -> Array:
+        """Fixes in a tile, s."""
+        inside: Array = self._fixes[(self._fixes >= tile.begin) & (self._fixes < tile.end)]
+        return inside
+
+    def _told(self, found: Stretch) -> ReceiverError:
+        false = self._false(found.tile)
+        return ReceiverError(float(false[0]), float(false[-1]), found.off, found.sigma)
+
+    def _left(self, known: Sequence[Stretch]) -> _Left:
+        """What each velocity is off by beside what was measured before, known errors taken out."""
+        full = self._full
+        model = calibration_model(
+            full.point, full.prior, full.settings.needs, (*full.families, *full.carried)
+        )
+        theta, covariance = known_without(full, model)
+        made = Pass(
+            model, full.point, (self._noise,), uses=UNGATED, theta=theta, covariance=covariance
+        )
+        made.keep_traces = made.keep_rows = True
+        rows = []
+        for batch in self._batches:
+            fixes = batch.fixes
+            v_n = fixes.v_n - _sum_at(full.point.true_time(fixes.t), known)
+            right = replace(batch, fixes=replace(fixes, v_n=v_n)) if known else batch
+            for x in through(made, right, full.settings.coast_s).traces:
+                off = x.y[: x.velocities] - x.h[: x.velocities] @ theta
+                rows.append((x.t, float(off @ off), float(x.velocities)))
+        return _Left(*np.array(rows).reshape(-1, 3).T)
+
+
+@dataclass(frozen=True, slots=True)
+class _Left:
+    """Of n epochs, s: chi-square of the velocity beside what was measured before, its freedom."""
+
+    t: Array
+    chi2: Array
+    freedom: Array
+
+    @property
+    def surprising(self) -> list[float]:
+        """Those that are hardly chance, the worst first, s.
+
+        A velocity that begins or ceases to be false is such a one, whatever comes after it.
+        """
+        n = int(np.sum(self.freedom > 0.0))
+        pairs = zip(self.chi2.tolist(), self.freedom.tolist(), strict=True)
+        score = np.array([surprise(x, int(k), n) if k else -np.inf for x, k in pairs])
+        worst = np.argsort(score)[::-1]
+        out: list[float] = self.t[worst[score[worst] > -2.0 * log(SEARCHED)]].tolist()
+        return out
+
+    def variance(self, tile: Tile) -> float:
+        """Of velocities in a tile and near it, over what is expected; gates refuse what is more."""
+        near = (self.t > tile.begin - NEAR_S) & (self.t < tile.end + NEAR_S)
+        chi2 = np.minimum(self.chi2[near], GATE_VELOCITY)
+        return float(chi2.sum() / max(self.freedom[near].sum(), 1.0))
+
+
+def _sum_at(t: Array, known: Sequence[Stretch]) -> Array:
+    """(n, 3) what known errors are at some moments, m/s."""
+    out = np.zeros((len(t), D))
+    for x in known:
+        out += x.tile.share(t)[:, None] * x.off
+    return out
