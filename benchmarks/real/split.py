@@ -109,6 +109,7 @@ LOOKS: tuple[str, ...] = (
     "what surely improves is a calibration, after 30 s and of hovers too, or as it was",
     "what a receiver states of its accuracy weighs, or a gate at 1.5 m/s",
     "offsets of two accelerometers surely wander apart, or as likely as not",
+    "a receiver's errors where its velocity jumps, or where gates refuse it for a while",
 )
 """Comparisons that were made on the choosing flights, one line each, in order."""
 JUDGED: tuple[str, ...] = (

@@ -42,5 +42,6 @@ MOST_PARTS: Final = 128
 every block."""
 MOST_EDGES: Final = 14
 """Moments at which a receiver's error begins, changes or ends."""
-CREEPS_S: Final = (2.0, 3.0, 4.0, 5.0, 7.0, 9.0, 13.0, 17.0, 23.0, 32.0, 44.0, 60.0)
-"""s over which an error of a receiver may have grown: an EKF takes what grows slower for true."""
+CREEPS_S: Final = (6.0, 8.0, 11.0, 15.0, 20.0, 27.0, 36.0, 48.0, 64.0)
+"""s over which an error of a receiver may have grown.  What comes and goes within twice the time of
+its colour is noise, and what grows slower than all of them an EKF takes for true."""

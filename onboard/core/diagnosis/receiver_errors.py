@@ -85,7 +85,10 @@ class Looking:
                 break
             moments = [*moments, *new][:MOST_EDGES]
             found = self._between(self._jumps(moments, found))
-            left = self._left(found) if found else left
+            if found:
+                # The attitude is that of a flight without errors until they are known.
+                found = self._chosen([x.tile for x in found], np.array([x.off for x in found]))
+                left = self._left(found)
         return tuple(self._told(x) for x in found if self._lasts(x, left))
 
     def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
@@ -118,11 +121,11 @@ class Looking:
         ]
         return self._chosen([*(x.tile for x in closed), *crept]) if crept else closed
 
-    def _chosen(self, tiles: Sequence[Tile]) -> tuple[Stretch, ...]:
-        """Of errors that there may be, those that there are."""
+    def _chosen(self, tiles: Sequence[Tile], seem: Array | None = None) -> tuple[Stretch, ...]:
+        """Those that there are, of errors that there may be, of sizes (n, 3) that they seem."""
         if not tiles:
             return ()
-        return Stretches(self._tiled(tiles), self._chance, self._variance).chosen()
+        return Stretches(self._tiled(tiles, seem), self._chance, self._variance).chosen()
 
     def _tiled(self, tiles: Sequence[Tile], seem: Array | None = None) -> Tiled:
         return Tiled(self._full, self._batches, self._noise, tiles, seem)
@@ -130,15 +133,16 @@ class Looking:
     def _lasts(self, found: Stretch, left: _Left) -> bool:
         """Whether an error is one of many fixes, and no chance where the receiver is noisy.
 
-        What is off by itself is what gates are for, and what is off for most of the flight is how
-        the receiver is.
+        A fix that is off by itself is what gates are for.  A jump without a partner is no more than
+        that, if what crept in before it explains nothing beyond: a receiver has lost a satellite.
         """
         fixes = len(self._false(found.tile))
         sigma = float(np.hypot(self._noise.velocity, self._noise.velocity_colour))
-        # What twice the log-likelihood falls by if each may be anything.
-        refused = fixes * (ANYTHING["vvv"] - D * (2.0 * log(sigma) + 1.0))
+        # What twice the log-likelihood falls by if a velocity may be anything.
+        refused = ANYTHING["vvv"] - D * (2.0 * log(sigma) + 1.0)
         enough = max(left.variance(found.tile), 1.0) * self._chance
-        return 1 < fixes < 0.5 * len(self._fixes) and min(found.gain, refused) > enough
+        enough += refused if found.tile.crept else 0.0
+        return fixes > 1 and min(found.gain, fixes * refused) > enough
 
     def _false(self, tile: Tile) -> Array:
         """Fixes in a tile, s."""

@@ -1,4 +1,4 @@
-"""A receiver that is off for a while: when, by what, and that it is no jump of the accelerometer."""
+"""A receiver that is off for a while: when and by what; it is no jump of the accelerometer."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,7 @@
 """Errors of a receiver in tiles of time, against a fit with the very columns, and by identities."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -55,7 +56,7 @@ def edges_of(full, *moments):
 
 def in_a_row(edges):
     """Tiles that follow on each other."""
-    return [Tile(float(a), float(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [Tile(float(a), float(b)) for a, b in pairwise(edges)]
 
 
 @pytest.mark.parametrize("crept", [False, True])
