@@ -77,18 +77,15 @@ class Looking:
     def errors(self) -> tuple[ReceiverError, ...]:
         """Those that are no chance, in order of time."""
         found: tuple[Stretch, ...] = ()
-        moments: list[float] = []
         left = self._left(found)
         for _ in range(FURTHEST):
-            new = [t for t in left.surprising if t not in moments]
-            if not new or len(moments) >= MOST_EDGES:
+            moments = left.surprising[:MOST_EDGES]
+            seen = self._between(self._jumps(moments, found)) if moments else ()
+            if {x.tile for x in seen} <= {x.tile for x in found}:
                 break
-            moments = [*moments, *new][:MOST_EDGES]
-            found = self._between(self._jumps(moments, found))
-            if found:
-                # The attitude is that of a flight without errors until they are known.
-                found = self._chosen([x.tile for x in found], np.array([x.off for x in found]))
-                left = self._left(found)
+            # The attitude is that of a flight without errors until they are known.
+            found = self._chosen([x.tile for x in seen], np.array([x.off for x in seen]))
+            left = self._left(found)
         return tuple(self._told(x) for x in found if self._lasts(x, left))
 
     def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
@@ -97,13 +94,13 @@ class Looking:
         between = np.concatenate(
             [[fixes[0] - 1.0], 0.5 * (fixes[1:] + fixes[:-1]), [fixes[-1] + 1.0]]
         )
-        about = np.searchsorted(fixes, moments)[:, None] + np.arange(-1, 3)
+        near = np.searchsorted(fixes, moments)[:, None] + np.arange(-1, 3)
         ends = np.searchsorted(between, [t for x in known for t in (x.tile.begin, x.tile.end)])
-        every = np.unique([*about.ravel(), *ends, 0, len(fixes)])
+        every = np.unique([*near.ravel(), *ends, 0, len(fixes)])
         edges = between[every[(every >= 0) & (every <= len(fixes))]]
         tiles = [Tile(a, b) for a, b in pairwise(edges.tolist())]
-        seem = _sum_at(0.5 * (edges[1:] + edges[:-1]), known)
-        found: list[float] = edges[VelocityJumps(self._tiled(tiles, seem)).found()].tolist()
+        about = _sum_at(0.5 * (edges[1:] + edges[:-1]), known)
+        found: list[float] = edges[VelocityJumps(self._tiled(tiles, about)).found()].tolist()
         return found
 
     def _between(self, jumps: Sequence[float]) -> tuple[Stretch, ...]:
@@ -121,14 +118,14 @@ class Looking:
         ]
         return self._chosen([*(x.tile for x in closed), *crept]) if crept else closed
 
-    def _chosen(self, tiles: Sequence[Tile], seem: Array | None = None) -> tuple[Stretch, ...]:
+    def _chosen(self, tiles: Sequence[Tile], about: Array | None = None) -> tuple[Stretch, ...]:
         """Those that there are, of errors that there may be, of sizes (n, 3) that they seem."""
         if not tiles:
             return ()
-        return Stretches(self._tiled(tiles, seem), self._chance, self._variance).chosen()
+        return Stretches(self._tiled(tiles, about), self._chance, self._variance).chosen()
 
-    def _tiled(self, tiles: Sequence[Tile], seem: Array | None = None) -> Tiled:
-        return Tiled(self._full, self._batches, self._noise, tiles, seem)
+    def _tiled(self, tiles: Sequence[Tile], about: Array | None = None) -> Tiled:
+        return Tiled(self._full, self._batches, self._noise, tiles, about)
 
     def _lasts(self, found: Stretch, left: _Left) -> bool:
         """Whether an error is one of many fixes, and no chance where the receiver is noisy.
