@@ -24,6 +24,7 @@ from onboard.daemon.setup import settings
 from onboard.daemon.setup.configuration import Configuration
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.traffic import Traffic
+from onboard.errors import DiskError
 from onboard.mavlink.autopilot import Participant
 from onboard.mavlink.board import Board
 from onboard.mavlink.link import Link
@@ -48,6 +49,7 @@ class Parts:
     observed: Observed
     traffic: Traffic
     journal: Journal
+    ledger: Ledger
     witness: Witness
     proposals: Proposals
     pusher: Pusher
@@ -100,6 +102,7 @@ class Parts:
             observed=observed,
             traffic=traffic,
             journal=journal,
+            ledger=ledger,
             witness=witness,
             proposals=proposals,
             pusher=pusher,
@@ -113,6 +116,8 @@ class Parts:
                 handover.repetitions,
                 Hindrance(link, parameters, traffic, has_key=signing is not None),
                 handover.failures,
+                ledger,
+                lambda: handover.unsaved,
                 notices,
             ),
         )
@@ -157,7 +162,11 @@ def _recorder(
     configuration: Configuration, notices: Notices, wall_clock: Callable[[], float]
 ) -> Recorder | None:
     directory = configuration.state.path()
-    recorder = settings.recorder(configuration.recording, directory, wall_clock)
+    try:
+        recorder = settings.recorder(configuration.recording, directory, wall_clock)
+    except DiskError as error:  # no reason to leave the vehicle without a calibration
+        notices.post("recording_stopped", f"nothing is recorded: {error}", warning=True)
+        return None
     if recorder is not None:
         recorder.tell = lambda text: notices.post("recording_stopped", text, warning=True)
     return recorder
