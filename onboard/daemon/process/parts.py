@@ -10,6 +10,7 @@ from onboard.daemon.learning.diagnoses import Diagnoses
 from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
+from onboard.daemon.process.calendar import Calendar
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.process.signing_file import SigningFile
@@ -38,6 +39,7 @@ from onboard.push.journal import Journal
 class Parts:
     """Everything that a service is made of but its outlets, which look at the whole of it."""
 
+    calendar: Calendar
     notices: Notices
     recorder: Recorder | None
     signing: Signing | None
@@ -77,20 +79,22 @@ class Parts:
             StateError: the journal is locked or damaged.
         """
         directory = configuration.state.path()
-        notices, witness, board = Notices(wall_clock), Witness(), Board()
+        calendar = Calendar(wall_clock, clock)
+        notices, witness, board = Notices(calendar), Witness(), Board()
         parameters, observed, traffic = ParameterWatch(), Observed(), Traffic()
         signing_file = SigningFile(directory / "signing.json")
         signing = settings.signing(configuration.link, wall_clock, signing_file.load())
         recorder = _recorder(configuration, notices, wall_clock)
         link = _link(configuration, signing, recorder, clock, wall_clock)
-        ledger = Ledger(journal := Journal(directory / "journal.jsonl"), wall_clock)
+        ledger = Ledger(journal := Journal(directory / "journal.jsonl"), calendar)
         proposals = _proposals(configuration, ledger)
         pusher = Pusher(ledger, proposals, witness, notices)
         situation = Situation(link, board, parameters, witness, proposals)
-        handover = _handover(configuration, notices, situation, clock, wall_clock)
+        handover = _handover(configuration, notices, situation, clock, calendar)
         link.presence.held = lambda: pusher.busy
         link.presence.committed = lambda: pusher.has_written or handover.has_learned
         return cls(
+            calendar=calendar,
             notices=notices,
             recorder=recorder,
             signing=signing,
