@@ -98,7 +98,7 @@ class Contact:
         if parts.handover.repetitions.contradictions:
             parts.proposals.doubt = "samples contradict each other: find out who sends, then reset"
         parts.board.confirm(now)
-        yields, two = not parts.link.twins.first(now), parts.board.are_two(now)
+        yields, two = not parts.link.twins.first(now), parts.company.are_two(now)
         if two and not self._two:
             parts.pusher.stop("two autopilots answer as one system", now)
         if two:

@@ -11,6 +11,7 @@ from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
 from onboard.daemon.process.calendar import Calendar
+from onboard.daemon.process.company import Company
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.process.signing_file import SigningFile
@@ -46,6 +47,7 @@ class Parts:
     signing_file: SigningFile
     link: Link
     board: Board
+    company: Company
     streams: Streams
     parameters: ParameterWatch
     observed: Observed
@@ -89,6 +91,7 @@ class Parts:
         ledger = Ledger(journal := Journal(directory / "journal.jsonl"), calendar)
         proposals = _proposals(configuration, ledger)
         pusher = Pusher(ledger, proposals, witness, notices)
+        company = Company(link, board, parameters)
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, calendar)
         link.presence.held = lambda: pusher.busy
@@ -101,6 +104,7 @@ class Parts:
             signing_file=signing_file,
             link=link,
             board=board,
+            company=company,
             streams=Streams(settings.stream_requests(configuration.link.rates)),
             parameters=parameters,
             observed=observed,
@@ -114,7 +118,7 @@ class Parts:
             handover=handover,
             vigilance=Vigilance(
                 link,
-                board,
+                company,
                 observed,
                 signing,
                 handover.repetitions,

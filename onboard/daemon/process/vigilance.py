@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 
 from onboard.daemon.learning.failures import Failures
 from onboard.daemon.process import limits
+from onboard.daemon.process.company import Company
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.autopilot import AutopilotState
-from onboard.mavlink.board import Board
 from onboard.mavlink.link import Link
 from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
@@ -31,7 +31,7 @@ class Vigilance:
 
     Args:
         link: what is heard, and of whom.
-        board: which board it says that it is.
+        company: whether two autopilots answer to its name.
         observed: the vehicle's condition.
         signing: the key's bookkeeping, None without a key.
         repetitions: samples with one time stamp and different content.
@@ -45,7 +45,7 @@ class Vigilance:
     def __init__(
         self,
         link: Link,
-        board: Board,
+        company: Company,
         observed: Observed,
         signing: Signing | None,
         repetitions: Repetitions,
@@ -56,7 +56,7 @@ class Vigilance:
         notices: Notices,
     ) -> None:
         self._link = link
-        self._board = board
+        self._company = company
         self._observed = observed
         self._signing = signing
         self._repetitions = repetitions
@@ -122,7 +122,7 @@ class Vigilance:
                 "heartbeats_contradict",
                 "heartbeats say armed and disarmed at the same time: nothing is written",
             )
-        if self._board.are_two(now) and self._link.autopilot is not None:
+        if self._company.are_two(now) and self._link.autopilot is not None:
             yield (
                 "two_vehicles",
                 (

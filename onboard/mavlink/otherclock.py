@@ -1,0 +1,48 @@
+"""Another boot clock beside the one that is followed: two autopilots under one name.
+
+One autopilot has one boot clock.  A reboot leaves the old one, of which nothing more comes but what
+was on its way; a packet that was held back is late once.  A clock that has stood beside the one
+that is followed for longer than any link delays, and has gone on as ours does, is another one's.
+"""
+
+from __future__ import annotations
+
+import math
+
+from onboard.core.inputs.boot_time import LONGEST_DELAY_S
+from onboard.mavlink import limits
+
+
+class OtherClock:
+    """Of one autopilot; ``now`` is our monotonic clock, s."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """It is another autopilot from here on."""
+        self._begun: tuple[float, float] | None = None
+        self._stamps = 0
+        self._two_at = -math.inf
+
+    def begin(self, t: float, now: float) -> None:
+        """Such a clock was heard, or left behind, at this stamp (s): does it go on?"""
+        self._begun, self._stamps = (t, now), 0
+
+    def take(self, t: float, now: float) -> bool:
+        """Whether a stamp is where this clock is by now; it is noted then."""
+        if self._begun is None:
+            return False
+        begun, since = self._begun
+        if abs(t - (begun + now - since)) > LONGEST_DELAY_S:
+            return False
+        # Within so long a reboot is over, and what was sent before it has come.
+        if now - since > limits.CLOCKS_APART_S:
+            self._stamps += 1
+            if self._stamps >= limits.PROOF_STAMPS:
+                self._two_at = now
+        return True
+
+    def goes_on(self, now: float) -> bool:
+        """Whether two clocks have gone on beside each other of late."""
+        return now - self._two_at < limits.TWO_BOARDS_S
