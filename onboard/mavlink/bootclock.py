@@ -126,8 +126,10 @@ class BootClock:
         t, at = self._heard
         if abs(stamp - (t + now - at)) <= LONGEST_DELAY_S:
             return False
-        if self.other.take(stamp, now):
-            return self.other.goes_on(now) or stamp > t
+        goes_on = now - at <= limits.FAILOVER_S
+        if self.other.take(stamp, now, beside=goes_on):
+            # One that does not go on was none: what came late was taken for a reboot.
+            return goes_on and (self.other.goes_on(now) or stamp > t)
         if began_anew(stamp, t):
             self.other.begin(stamp, now)
         return False

@@ -22,22 +22,32 @@ class OtherClock:
     def forget(self) -> None:
         """It is another autopilot from here on."""
         self._begun: tuple[float, float] | None = None
+        self._since = self._last = -math.inf
         self._stamps = 0
         self._two_at = -math.inf
 
     def begin(self, t: float, now: float) -> None:
         """Such a clock was heard, or left behind, at this stamp (s): does it go on?"""
-        self._begun, self._stamps = (t, now), 0
+        self._begun, self._since, self._last, self._stamps = (t, now), now, now, 0
 
-    def take(self, t: float, now: float) -> bool:
-        """Whether a stamp is where this clock is by now; it is noted then."""
+    def take(self, t: float, now: float, *, beside: bool) -> bool:
+        """Whether a stamp is where this clock is by now; it is noted then.
+
+        Args:
+            t: the stamp, s.
+            now: our own clock, s.
+            beside: the clock that is followed goes on, too.
+        """
         if self._begun is None:
             return False
-        begun, since = self._begun
-        if abs(t - (begun + now - since)) > LONGEST_DELAY_S:
+        begun, at = self._begun
+        if abs(t - (begun + now - at)) > LONGEST_DELAY_S:
             return False
+        if not beside or now - self._last > LONGEST_DELAY_S:  # late packets come in bursts
+            self._since, self._stamps = now, 0
+        self._last = now
         # Within so long a reboot is over, and what was sent before it has come.
-        if now - since > limits.CLOCKS_APART_S:
+        if now - self._since > limits.CLOCKS_APART_S:
             self._stamps += 1
             if self._stamps >= limits.PROOF_STAMPS:
                 self._two_at = now

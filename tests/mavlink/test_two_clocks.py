@@ -105,6 +105,42 @@ def test_one_is_one(name):
     assert clock.latest == pytest.approx(max(s for t, s in ONE[name]().packets if t > 80.0), abs=3)
 
 
+def burst(line, at, late, count=40):
+    """Packets of one autopilot that come this late, together with those of now."""
+    line.packets += [(at + i / RATE, 1000.0 + at + i / RATE - late) for i in range(count)]
+    return line
+
+
+@pytest.mark.parametrize("late", [4.0, 6.0, 20.0])
+def test_packets_that_come_later_than_a_link_delays_them_are_no_second_one(late):
+    line = Line().autopilot(1000.0, 0.0, 120.0)
+    for at in (30.0, 33.5, 50.0, 52.0, 90.0):
+        burst(line, at, late)
+    clock = line.heard()
+    assert not two(clock, 120.0)
+    assert clock.latest == pytest.approx(1120.0, abs=0.2)
+    assert clock.certain(120.0)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_what_was_taken_for_a_reboot_is_over_in_seconds(count):
+    line = Line().autopilot(1000.0, 0.0, 33.0)
+    late = [(30.01 + i / 1000, 1020.0 + i / 1000) for i in range(count)]
+    line.packets += late
+    clock = line.heard()
+    assert clock.latest == pytest.approx(1033.0, abs=0.2)
+    assert clock.certain(33.0)
+    assert clock.reboots <= 1
+
+
+def test_one_of_two_that_goes_leaves_the_other():
+    for first, second in ((900.0, 100.0), (100.0, 900.0)):
+        line = Line().autopilot(first, 0.0, 40.0).autopilot(second, 10.0, 80.0)
+        clock = line.heard()
+        assert clock.latest == pytest.approx(second + 70.0, abs=0.2)
+        assert clock.certain(80.0)
+
+
 def test_packets_of_before_a_reboot_that_come_late_are_no_second_one():
     line = Line().autopilot(1000.0, 0.0, 30.0).autopilot(0.5, 30.5, 60.0)
     line.packets += [(31.5, 1029.7), (31.6, 1029.8), (31.7, 1029.9)]
