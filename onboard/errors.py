@@ -1,5 +1,10 @@
 """One tree of errors, by cause; the command line turns each cause into an exit status."""
 
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
 
 class OnboardError(Exception):
     """Anything that this package raises on purpose: one clear line for a person."""
@@ -47,7 +52,25 @@ class StateError(OnboardError):
     exit_status = 2
 
 
+class DiskError(StateError):
+    """The disk is full, read-only or failing: what it does not do now it may do again later."""
+
+
+def disk_error(path: Path, error: OSError) -> StateError:
+    """What the disk said of a file, as one of ours: a :class:`DiskError` if it is the disk's fault.
+
+    A wrong path or a permission that is missing is not: somebody has to mend that.
+    """
+    kind = DiskError if error.errno in _OF_THE_DISK else StateError
+    return kind(f"{path}: {error.strerror or error}")
+
+
 class RefusedError(OnboardError):
     """What a person asked of the running service cannot be done now; says why."""
 
     exit_status = 2
+
+
+_OF_THE_DISK = frozenset(
+    {errno.EIO, errno.ENOSPC, errno.EROFS, errno.EDQUOT, errno.ENXIO, errno.ENODEV, errno.ESTALE}
+)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from unittest.mock import patch
 
-from onboard.push import journal
+from onboard.push import journal_file
 
 
 class KilledError(BaseException):
@@ -95,6 +95,6 @@ class _Os:
 def journals_on(disk: Disk) -> Iterator[None]:
     """While this lasts every journal writes to this disk."""
     with patch.multiple(
-        journal, os=_Os(disk), _write_all=disk.write, _sync_directory=disk.sync_directory
+        journal_file, os=_Os(disk), _write_all=disk.write, _sync_directory=disk.sync_directory
     ):
         yield

@@ -235,6 +235,7 @@ class History:
         try:
             self._journal.append(record.entry, self.agenda.now)
         except StateError as error:
+            self._journal.owe(record.entry, self.agenda.now)  # as the ledger does
             return JournalFailed(str(error))
         return JournalWritten()
 

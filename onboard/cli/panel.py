@@ -15,7 +15,7 @@ from onboard.answers.words import DISTRUST
 from onboard.cli.happened import Line, happened
 from onboard.core.estimate.result import SIX_NAMES
 from onboard.core.maths.accelerometer import parameter_names
-from onboard.daemon.view.snapshot import AccountView, ImuView, Snapshot, WrittenView
+from onboard.daemon.view.snapshot import DATED_FROM, AccountView, ImuView, Snapshot, WrittenView
 
 JOURNAL_LINES = 5
 NOT_SEEN = {"no": "not seen yet", "together": "with its axis"}
@@ -234,11 +234,13 @@ def _style(line: Line) -> str:
 
 
 def clock(at: float) -> str:
-    """A moment of today."""
-    return time.strftime("%H:%M:%S", time.localtime(at))
+    """A moment of today; of a companion whose clock was not set nobody knows it."""
+    return time.strftime("%H:%M:%S", time.localtime(at)) if at >= DATED_FROM else "--:--:--"
 
 
 def _moment(at: float) -> str:
+    if at < DATED_FROM:
+        return "(date not known)"
     return time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
 
 

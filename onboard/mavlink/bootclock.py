@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from onboard.core.inputs.boot_time import LONGEST_DELAY_S, began_anew
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import MESSAGE_IDS, Message
+from onboard.mavlink.otherclock import OtherClock
 
 STAMPED_MS: Final = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE")
 """Messages with a 32-bit ``time_boot_ms`` of the moment of sending."""
@@ -59,6 +60,7 @@ class BootClock:
         self.reboots = 0
         self.unseen = False
         """Whether the last reboot was in a silence: its stamps have not gone back."""
+        self.other = OtherClock()
         self._suspect: float | None = None
         self._heard: tuple[float, float] | None = None
         self._silence: tuple[float, float, float, float] | None = None
@@ -69,6 +71,7 @@ class BootClock:
         """It is another autopilot from here on."""
         self.latest = self._suspect = self._unix_offset = None
         self._heard = self._silence = None
+        self.other.forget()
         self._paired = False
 
     def certain(self, now: float) -> bool:
@@ -91,6 +94,9 @@ class BootClock:
             now: our own monotonic clock, s, where there is one: a recording has none.
         """
         number, before = message.get_msgId(), self.reboots
+        stamp = None if now is None else self._stamp(message)
+        if stamp is not None and now is not None and self._is_of_another(stamp, now):
+            return False
         if number in _MS:
             self._tick(self.seconds_ms(message.time_boot_ms))
         elif number in _US:
@@ -98,11 +104,35 @@ class BootClock:
         elif number == _SYSTEM_TIME:
             self._pair(message.time_unix_usec, message.time_boot_ms)
         if self.reboots != before:
+            if self._heard is not None:
+                self.other.begin(*self._heard)
             self._heard = self._silence = None
         # Unix time runs on through a reboot, and is no boot time before both are known at once.
-        if now is not None and self.latest is not None and boot_seconds(message) is not None:
+        if now is not None and self.latest is not None and stamp is not None:
             self._keep_pace(self.latest, now)
         return self.reboots != before
+
+    def _stamp(self, message: Message) -> float | None:
+        """The boot time that a message tells, s; 32 bits go on across their wrap."""
+        if message.get_msgId() in _US:
+            return boot_seconds(message)
+        told = boot_seconds(message)
+        return None if told is None else self.seconds_ms(message.time_boot_ms)
+
+    def _is_of_another(self, stamp: float, now: float) -> bool:
+        """Whether a stamp is not this clock's, but that of another one that goes on beside it."""
+        if self._heard is None:
+            return False
+        t, at = self._heard
+        if abs(stamp - (t + now - at)) <= LONGEST_DELAY_S:
+            return False
+        goes_on = now - at <= limits.FAILOVER_S
+        if self.other.take(stamp, now, beside=goes_on):
+            # One that does not go on was none: what came late was taken for a reboot.
+            return goes_on and (self.other.goes_on(now) or stamp > t)
+        if began_anew(stamp, t):
+            self.other.begin(stamp, now)
+        return False
 
     def _keep_pace(self, latest: float, now: float) -> None:
         """Whether it has gone on as ours has while nothing was heard, as far as is known by now."""

@@ -126,6 +126,9 @@ EARLY_PARAMETERS: Final = 3000
 BOARD_ASKED_S: Final = 30.0
 """s between two questions to a board that has said which it is: as often as its parameters are read
 anew, in a hundred bytes [cost]."""
+CLOCKS_APART_S: Final = 9.0
+"""s for which another boot clock has to go on beside the one that is followed to be another one's:
+three times what a link delays, a reboot and all that was on its way before it included [data]."""
 TWO_BOARDS_S: Final = 100.0
 """s after two boards have answered in turn for which both are there: three questions [data]."""
 ANSWER_TIMEOUT_S: Final = (1.0, 1.0, 2.0, 4.0, 1.0, 1.0, 2.0, 4.0)

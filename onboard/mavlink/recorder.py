@@ -13,7 +13,7 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-from onboard.errors import ConfigurationError
+from onboard.errors import ConfigurationError, DiskError, disk_error
 from onboard.mavlink import limits
 
 _STAMP = struct.Struct(">Q")
@@ -28,6 +28,7 @@ class Recorder:
 
     Raises:
         ConfigurationError: the file cannot be created.
+        DiskError: it cannot, and that is the disk's fault.
     """
 
     def __init__(self, path: Path) -> None:
@@ -40,6 +41,9 @@ class Recorder:
         try:
             self._file = path.open("ab", buffering=0)
         except OSError as error:
+            refusal = disk_error(path, error)
+            if isinstance(refusal, DiskError):
+                raise refusal from None
             raise ConfigurationError(f"{path}: cannot record: {error.strerror}") from None
         self._failed = False
         self._job: asyncio.Future[None] | None = None

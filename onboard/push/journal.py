@@ -12,6 +12,11 @@ A damaged line in the middle (worn SD card) is skipped and counted; what was los
 shows: a lost ``Closed`` leaves a transaction open, which reading the autopilot settles; a
 lost ``Planned`` of an open transaction is an error, since nobody knows the old values.
 
+**A disk that does not take it** (full, read-only, failing; now or at the start) is in ``trouble``
+until it does again, and no transaction begins without it.  What only says something, and moves no
+transaction (a verdict, a refusal), holds all the same: it is *owed* to the disk, and written first
+when the disk takes anything.
+
 One process at a time: the file is locked while it is open.  Methods block for the time of an
 fsync (milliseconds); an asyncio driver may call them in a thread.
 """
@@ -19,8 +24,6 @@ fsync (milliseconds); an asyncio driver may call them in a thread.
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
@@ -29,7 +32,7 @@ from zlib import crc32
 
 import msgspec
 
-from onboard.errors import PushError, StateError
+from onboard.errors import DiskError, PushError, StateError
 from onboard.push.entries import (
     Closed,
     Entry,
@@ -45,10 +48,9 @@ from onboard.push.entries import (
     Verdict,
     Watched,
 )
+from onboard.push.journal_file import JournalFile
 
 SCHEMA = 1
-LARGEST = 64_000_000
-"""bytes; compaction keeps the file near a megabyte."""
 LONGEST_LINE = 1_000_000
 """bytes; the longest entry has a few thousand."""
 _REMARKS = Watched | Found | Refused | Replaced
@@ -67,8 +69,12 @@ class Line(msgspec.Struct, frozen=True):
 class Journal:
     """The journal of one daemon.
 
+    ``trouble`` says why the disk does not take it, empty: it does; ``read`` whether it is known
+    what the file says.
+
     Raises:
-        StateError: the file cannot be opened, is in use, or is of a newer version.
+        StateError: the file cannot be opened for want of a permission or the like, is in use, or is
+            of a newer version.
     """
 
     def __init__(self, path: Path, *, limit_bytes: int = 1_000_000, keep: int = 50) -> None:
@@ -85,6 +91,7 @@ class Journal:
         self._limit = limit_bytes
         self._keep = keep
         self._lines: list[tuple[float, Entry]] = []
+        self._owed: list[tuple[float, Entry]] = []
         self._last: dict[int, list[Planned]] = {}
         self._others: frozenset[str] | None = None
         self._encoder = msgspec.json.Encoder()
@@ -92,20 +99,32 @@ class Journal:
         self.damaged = 0
         self.appended = 0
         """Entries since it was opened: the last ones."""
-        self._size = 0
-        self._torn = False
-        self._fd = -1
+        self.trouble = ""
+        self.read = self._closed = False
+        self._file = JournalFile(path)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._fd = self._open()
-            self._load()
-        except OSError as error:
-            self.close()
-            raise StateError(f"{path}: {error.strerror}") from error
+            self._begin()
         except BaseException:
             self.close()
             raise
-        if self._size > self._limit:
+
+    def _begin(self) -> None:
+        """Open the file; one on a disk in trouble is read, if it can be."""
+        try:
+            self._open()
+        except DiskError as error:
+            self.trouble = str(error)
+            with contextlib.suppress(DiskError):
+                self._load(self._file.look())
+
+    def _open(self) -> None:
+        lines = self._file.open()
+        try:
+            self._load(lines)
+        except StateError:
+            self._file.close()
+            raise
+        if self._file.size > self._limit and not self._owed:
             self._compact()
 
     def __enter__(self) -> Self:
@@ -121,9 +140,8 @@ class Journal:
 
     def close(self) -> None:
         """Release the file."""
-        if self._fd >= 0:
-            os.close(self._fd)
-            self._fd = -1
+        self._closed = True
+        self._file.close()
 
     @property
     def entries(self) -> tuple[tuple[float, Entry], ...]:
@@ -137,23 +155,56 @@ class Journal:
             StateError: it could not be written (disk full, ...): nothing may be sent that
                 relies on it.
         """
-        line = self._line(entry, at)
-        try:
-            self._refuse_another()
-            if self._torn:  # the disk was full in the middle of a line: start a clean one
-                os.ftruncate(self._fd, self._size)
-            self._torn = True
-            _write_all(self._fd, line)
-            os.fsync(self._fd)
-        except OSError as error:
-            raise StateError(f"{self._path}: {error.strerror}") from error
-        self._torn = False
-        self._size += len(line)
+        self._write([*self._owed, (at, entry)])
         self._lines.append((at, entry))
         self.appended += 1
         self._changed()
-        if self._size > self._limit and isinstance(entry, Closed | _REMARKS):
+        if self._file.size > self._limit and isinstance(entry, Closed | _REMARKS):
             self._compact()
+
+    def owe(self, entry: Entry, at: float) -> bool:
+        """Have an entry that the disk has not taken hold all the same, and written when it does.
+
+        Returns:
+            False if it is one of a transaction: those are on the disk, or are not.
+        """
+        if not isinstance(entry, _REMARKS):
+            return False
+        self._owed.append((at, entry))
+        self._lines.append((at, entry))
+        self.appended += 1
+        self._changed()
+        return True
+
+    def settle(self) -> None:
+        """Write what is owed, if the disk has room for a transaction again.
+
+        Raises:
+            StateError: it has not.
+        """
+        self._write(self._owed, room=True)
+
+    def _write(self, lines: Iterable[tuple[float, Entry]], *, room: bool = False) -> None:
+        """Put these into the file, on whose trouble that decides.
+
+        Raises:
+            StateError: the disk does not take them.
+        """
+        lines = tuple(lines)
+        if self._closed:
+            raise StateError(f"{self._path}: closed")
+        try:
+            if not self._file.writable:
+                self._open()
+            if room:
+                self._file.has_room()
+            if lines:
+                self._file.append(b"".join(self._line(entry, at) for at, entry in lines))
+        except StateError as error:
+            self.trouble = str(error)
+            raise
+        self.trouble = ""
+        self._owed.clear()
 
     def recover(self) -> tuple[Recovery, ...]:
         """The transactions that are open, oldest first: each is to be resumed.
@@ -276,45 +327,8 @@ class Journal:
             ),
         )
 
-    def _refuse_another(self) -> None:
-        """The next start reads what is at the path, which is to be the file that is open.
-
-        It is not any more where somebody has put the directory elsewhere, or an older state back.
-
-        Raises:
-            StateError: something else is there, or nothing.
-            OSError: it cannot be seen.
-        """
-        try:
-            same = os.path.samestat(os.fstat(self._fd), self._path.stat())
-        except FileNotFoundError:
-            same = False
-        if not same:
-            raise StateError(
-                f"{self._path}: is not the journal that was opened; restart the service"
-            )
-
-    def _open(self) -> int:
-        fd = os.open(self._path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            os.close(fd)
-            raise StateError(f"{self._path}: in use by another process") from None
-        try:
-            _sync_directory(self._path.parent)
-        except OSError:
-            os.close(fd)
-            raise
-        return fd
-
-    def _load(self) -> None:
-        if os.fstat(self._fd).st_size > LARGEST:
-            raise StateError(f"{self._path}: larger than a journal can become; look at it")
-        data = self._path.read_bytes()
-        whole, _, torn = data.rpartition(b"\n")
-        self._size = len(data) - len(torn)
-        self._torn = bool(torn)
+    def _load(self, whole: bytes) -> None:
+        self.damaged, self._lines = 0, []
         for number, line in enumerate(whole.split(b"\n") if whole else [], start=1):
             try:
                 if len(line) > LONGEST_LINE:
@@ -330,6 +344,9 @@ class Journal:
             except (msgspec.DecodeError, ValueError, RecursionError, PushError):
                 # ValueError: text that is not UTF-8, a number with too many digits.
                 self.damaged += 1
+        self._lines += self._owed
+        self.read = True
+        self._changed()
 
     def _line(self, entry: Entry, at: float) -> bytes:
         body = self._encoder.encode(entry)
@@ -350,37 +367,6 @@ class Journal:
         lines = [(at, e) for at, e in self._lines if e.transaction in keep]
         if len(lines) == len(self._lines) and not self.damaged:
             return
-        temporary = self._path.with_suffix(self._path.suffix + ".new")
-        data = b"".join(self._line(e, at) for at, e in lines)
-        fd = -1
-        try:
-            fd = os.open(temporary, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_TRUNC, 0o600)
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            _write_all(fd, data)
-            os.fsync(fd)
-            temporary.rename(self._path)
-        except OSError:
-            if fd >= 0:
-                os.close(fd)
-                temporary.unlink(missing_ok=True)
-            return
-        os.close(self._fd)
-        self._fd, self._size, self._lines, self.damaged = fd, len(data), lines, 0
-        self._changed()
-        self._torn = False
-        with contextlib.suppress(OSError):  # either file is whole, whichever survives
-            _sync_directory(self._path.parent)
-
-
-def _write_all(fd: int, data: bytes) -> None:
-    view = memoryview(data)
-    while view:
-        view = view[os.write(fd, view) :]
-
-
-def _sync_directory(path: Path) -> None:
-    fd = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)
+        if self._file.replace(b"".join(self._line(entry, at) for at, entry in lines)):
+            self._lines, self.damaged = lines, 0
+            self._changed()

@@ -13,6 +13,7 @@ from onboard.daemon.learning.store import LARGEST, Store
 from onboard.daemon.view.history import History
 from onboard.errors import StateError
 from onboard.push import journal as journal_module
+from onboard.push import journal_file
 from onboard.push.journal import Journal
 from tests.daemon.blank_snapshot import blank_snapshot
 
@@ -48,7 +49,7 @@ def test_a_hostile_line_of_the_journal_is_counted_and_the_rest_is_read(tmp_path,
 
 
 def test_a_journal_without_end_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(journal_module, "LARGEST", 1000)
+    monkeypatch.setattr(journal_file, "LARGEST", 1000)
     path = tmp_path / "journal.jsonl"
     path.write_bytes(line(found()) * 100)
     for _ in range(2):  # the first leaves no lock behind

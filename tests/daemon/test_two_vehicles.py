@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from onboard.daemon.pushing.parameters import NEEDED
 from onboard.errors import RefusedError
 from tests.daemon.daemons import (
     WANTED,
@@ -68,3 +69,66 @@ async def test_one_that_comes_later_is_found_and_gets_nothing(document, daemon, 
         await service.rollback((1,))
         await until(lambda: in_force(vehicle) == pytest.approx(before))
         assert len(vehicle.sets) > count
+
+
+class Second(Vehicle):
+    """Another board on the same line; neither tells its unique id."""
+
+    def __init__(self, first, *, apart):
+        super().__init__(0)
+        self.board = first.board = ""
+        self.boot_ms = first.boot_ms + 1e3 * apart + 7.0
+        self._first = first
+
+    async def __aenter__(self):
+        first = self._first
+        self._transport, self._address = first._transport, first._address
+        alone = first.datagram_received
+
+        def both(data, address):
+            alone(data, address)
+            self.datagram_received(data, address)
+
+        first.datagram_received = both
+        self._task = asyncio.create_task(self._stream(), name="second vehicle")
+        return self
+
+    async def __aexit__(self, *_):
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+
+
+@pytest.mark.parametrize("apart", [0.05, 1.0, 60.0, -60.0])
+async def test_two_that_tell_no_unique_id_are_noticed_and_nothing_is_written(
+    document, daemon, port, apart
+):
+    document["push"]["approval"] = True
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        vehicle.parameters["INS_GYROFFS_X"] = 0.0123
+        second = Second(vehicle, apart=apart)
+        second.parameters["INS_GYROFFS_X"] = -0.0045
+        async with second:
+            await until(lambda: notices(service, "two_vehicles"))
+            convinced(service, WANTED)
+            document["push"]["approval"] = service.parts.proposals.approval = False
+            sent = len(vehicle.heard)
+            await asyncio.sleep(40.0)
+            assert vehicle.sets == second.sets == []
+            assert service.snapshot().mode == "advise_only"
+            assert len(notices(service, "two_vehicles")) == 1
+            assert service.snapshot().link.counters["reboots"] <= 1
+            assert len(vehicle.heard) - sent < 40 * 20, "they are not asked over and over again"
+
+
+async def test_values_that_change_are_asked_for_at_a_pace(document, daemon, port):
+    """Of two, each contradicts the other at every answer."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        second = Second(vehicle, apart=0.05)
+        for name in list(second.parameters):
+            second.parameters[name] += 1.0
+        async with second:
+            await until(lambda: service.snapshot().counters.get("parameters_changed"))
+            asked = vehicle.heard.count("PARAM_REQUEST_READ")
+            await asyncio.sleep(60.0)
+            asked = vehicle.heard.count("PARAM_REQUEST_READ") - asked
+            assert asked < 8 * len(NEEDED), "each every ten seconds, and all every thirty"

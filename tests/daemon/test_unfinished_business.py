@@ -304,3 +304,30 @@ async def test_a_daemon_started_in_flight_waits_for_the_landing(document, daemon
             assert in_force(vehicle) == before
             vehicle.armed, vehicle.landed = False, True
             await until(lambda: service.snapshot().push.can_roll_back == (1,))
+
+
+@pytest.mark.parametrize("where", ["feed", "poll", "consider"])
+async def test_a_fault_of_ours_in_a_push_ends_the_service_and_the_next_start_undoes_it(
+    document, daemon, port, where
+):
+    """Who has lost count of what was written does not go on writing; the journal has not."""
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        service = made(document)
+        convinced(service, WANTED)
+        sound = getattr(service.parts.pusher, where)
+
+        def broken(*args, **kwargs):
+            if len(vehicle.sets) == 3:
+                raise ArithmeticError(where)
+            return sound(*args, **kwargs)
+
+        setattr(service.parts.pusher, where, broken)
+        task = asyncio.create_task(service.run())
+        with pytest.raises((ArithmeticError, BaseExceptionGroup)):
+            await task
+        assert len(vehicle.sets) == 3
+        assert in_force(vehicle) != pytest.approx(before)
+        async with daemon(document) as again:
+            await until(lambda: not again.parts.journal.recover())
+            assert in_force(vehicle) == pytest.approx(before)

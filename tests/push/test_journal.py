@@ -1,6 +1,7 @@
 import errno
 import os
 import shutil
+from contextlib import ExitStack
 
 import pytest
 from hypothesis import given, settings
@@ -13,6 +14,7 @@ from onboard.push.entries import (
     Planned,
     Purpose,
     ReadBack,
+    Refused,
     Result,
     Undoing,
     Verdict,
@@ -20,6 +22,7 @@ from onboard.push.entries import (
     Writing,
 )
 from onboard.push.journal import Journal
+from tests.daemon.disks import failing
 from tests.push.pushing import make_plan
 
 PLAN = make_plan()
@@ -176,18 +179,96 @@ def test_unusable_place_is_one_clear_error(tmp_path):
         Journal(tmp_path)
 
 
+@pytest.mark.parametrize("number", [errno.EIO, errno.EROFS, errno.ENOSPC, errno.EACCES])
 @pytest.mark.parametrize(
-    "broken", ["onboard.push.journal._sync_directory", "pathlib.Path.read_bytes"]
+    "broken", ["onboard.push.journal_file._sync_directory", "pathlib.Path.read_bytes"]
 )
-def test_a_start_that_fails_leaves_no_lock(path, monkeypatch, broken):
+def test_a_start_that_fails_leaves_no_lock(path, monkeypatch, broken, number):
     def fail(*_):
-        raise OSError(errno.EIO, os.strerror(errno.EIO))
+        raise OSError(number, os.strerror(number))
 
     with monkeypatch.context() as failing:
         failing.setattr(broken, fail)
-        with pytest.raises(StateError, match="Input/output"):
-            Journal(path)
+        if number == errno.EACCES:  # no disk's fault, and nothing that goes away
+            with pytest.raises(StateError, match="Permission"):
+                Journal(path)
+        else:
+            with Journal(path) as journal:
+                assert os.strerror(number) in journal.trouble
+                with pytest.raises(StateError, match=os.strerror(number)):
+                    journal.append(story("a")[0], 1.0)
     Journal(path).close()
+
+
+class TestADiskInTrouble:
+    @pytest.fixture
+    def disk(self, path, monkeypatch):
+        with ExitStack() as stack:
+            stack.enter_context(failing(monkeypatch, path.parent))
+            yield stack
+
+    def test_what_it_has_is_known_and_what_it_does_not_take_is_not_called_written(
+        self, path, monkeypatch
+    ):
+        write(path, story("a")[:3])
+        before = path.read_bytes()
+        with failing(monkeypatch, path.parent), Journal(path) as journal:
+            assert journal.read
+            (recovery,) = journal.recover()
+            assert recovery.transaction == "a"
+            with pytest.raises(StateError):
+                journal.append(story("b")[0], 2.0)
+            assert [e for _, e in journal.entries] == story("a")[:3]
+            with pytest.raises(StateError, match="in use"):
+                Journal(path)
+        assert path.read_bytes() == before
+
+    def test_what_only_says_something_is_owed_and_written_first(self, path, disk):
+        refused, found = Refused("r", 1, "a person rejected it"), story("b")
+        with Journal(path) as journal:
+            for entry in (refused, found[0]):
+                with pytest.raises(StateError):
+                    journal.append(entry, 1.0)
+                journal.owe(entry, 1.0)
+            assert journal.refusals() == {1: "a person rejected it"}
+            assert [e for _, e in journal.entries] == [refused], "a plan is written, or is not"
+            disk.close()
+            journal.append(found[0], 2.0)
+            assert not journal.trouble
+            assert list(journal.entries) == [(1.0, refused), (2.0, found[0])]
+        assert read(path)[0] == [refused, found[0]]
+
+    def test_it_is_over_when_there_is_room_for_a_transaction(self, path, disk, monkeypatch):
+        refused = Refused("r", 1, "a person rejected it")
+        with Journal(path) as journal:
+            journal.owe(refused, 1.0)
+            with pytest.raises(StateError):
+                journal.settle()
+            disk.close()
+            real = os.write
+
+            def nearly_full(descriptor, data):
+                if len(data) > 4000:
+                    raise OSError(errno.ENOSPC, "No space left on device")
+                return real(descriptor, data)
+
+            with monkeypatch.context() as patch:
+                patch.setattr(os, "write", nearly_full)
+                with pytest.raises(StateError, match="No space"):
+                    journal.settle()
+            assert journal.trouble
+            journal.settle()
+            assert not journal.trouble
+        assert os.listdir(path.parent) == [path.name]
+        assert read(path)[0] == [refused]
+
+    def test_one_that_is_closed_is_not_opened_again(self, path, disk):
+        journal = Journal(path)
+        journal.close()
+        disk.close()
+        with pytest.raises(StateError, match="closed"):
+            journal.settle()
+        Journal(path).close()
 
 
 def test_full_disk_is_reported_and_the_file_stays_whole(path, monkeypatch):

@@ -90,6 +90,8 @@ class Handover:
         self.learned: Learned | None = None
         self.counters: Counter[str] = Counter()
         self.failures = Failures()
+        self.unsaved = ""
+        """Why what is learned is not kept over a restart, in a sentence; empty: it is."""
         self._learner = learner
         self._successor = successor
         self._notices = notices
@@ -279,10 +281,11 @@ class Handover:
             await self._call(self._learner.save, self._wall_clock())
         except StateError as error:
             self.counters["save_failed"] += 1
+            self.unsaved = f"what is learned is not kept over a restart: {error}"
             if self._disk.failed(str(error), now):
-                text = f"what is learned is not kept over a restart: {error}"
-                self._notices.post("not_saved", text, warning=True)
+                self._notices.post("not_saved", self.unsaved, warning=True)
             return
+        self.unsaved = ""
         self._disk.works(now)
         over = self._disk.over(now)
         if over is not None:

@@ -19,7 +19,7 @@ from zlib import crc32
 import msgspec
 
 from onboard.daemon.learning import limits
-from onboard.errors import StateError
+from onboard.errors import DiskError, StateError, disk_error
 
 SCHEMA = 2
 LARGEST = 64_000_000
@@ -43,7 +43,7 @@ class Store:
     """Reads and writes the files.
 
     Raises:
-        StateError: the directory cannot be made.
+        StateError: the directory cannot be made, and that is not the disk's fault.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -51,7 +51,9 @@ class Store:
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise StateError(f"{directory}: {error.strerror}") from None
+            refusal = disk_error(directory, error)
+            if not isinstance(refusal, DiskError):  # which may take it later
+                raise refusal from None
 
     def path(self, system_id: int, board: str = "") -> Path:
         """File of one board; ``board`` is its unique id in hex, empty if it tells none."""
@@ -141,6 +143,7 @@ class Store:
         )
         temporary = path.with_suffix(".new")
         try:
+            self.directory.mkdir(parents=True, exist_ok=True)
             if not path.exists():
                 self._make_room()
             with temporary.open("wb") as file:

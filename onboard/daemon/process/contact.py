@@ -47,6 +47,7 @@ class Contact:
         self._life = life
         self._silence, self._reboots = Outage(), Outage()
         self._yields = self._two = False
+        self._disk = ""
         self._next_kept = 0.0
 
     def on_link_event(self, now: float, event: LinkEvent) -> None:
@@ -97,14 +98,18 @@ class Contact:
         if parts.handover.repetitions.contradictions:
             parts.proposals.doubt = "samples contradict each other: find out who sends, then reset"
         parts.board.confirm(now)
-        yields, two = not parts.link.twins.first(now), parts.board.are_two(now)
+        yields, two = not parts.link.twins.first(now), parts.company.are_two(now)
         if two and not self._two:
             parts.pusher.stop("two autopilots answer as one system", now)
         if two:
             doubt = "two autopilots have spoken as one system: reset, then fly again"
             parts.proposals.doubt = doubt
-        if (yields, two) != (self._yields, self._two):
-            self._yields, self._two = yields, two
+        parts.ledger.tend(now, doubted=bool(parts.handover.unsaved))
+        disk = parts.ledger.trouble
+        if self._disk and not disk:
+            parts.notices.post("journal_back", "the disk takes the journal again")
+        if (yields, two, disk) != (self._yields, self._two, self._disk):
+            self._yields, self._two, self._disk = yields, two, disk
             self._decide()
         if now >= self._next_kept:
             self._next_kept = now + limits.SIGNING_KEPT_S
@@ -125,6 +130,9 @@ class Contact:
             )
         elif self._yields:
             self._advise_only("another onboard service was there first")
+        elif self._disk:
+            self._advise_only(f"nothing is written without a journal: {self._disk}")
+            self._parts.proposals.forbidden = ""  # what is open on the disk is still undone
         else:
             self._life.mode, self._life.mode_reason = "active", ""
             self._parts.proposals.forbidden = ""

@@ -35,6 +35,15 @@ SIGNING_KEPT_S: Final = 10.0
 nothing is used twice after a crash [cost: one small file]."""
 CLOCK_APART_S: Final = 60.0
 """s between the clocks of signing from which on it is said [protocol: a new stream's lag]."""
+CLOCK_STOOD_S: Final = 60.0
+"""s that the autopilot's time of day is ahead of ours from which on ours has stood still: what
+people read has minutes [use]."""
+CLOCKS_AGREE_S: Final = 3.0
+"""s that two reports of a time may lie apart, beside what went by between them: what the slowest
+links delay, and the clock's being told in whole seconds [data]."""
+CLOCK_WATCHED_S: Final = 20.0
+"""s of such reports before the time is believed: a simulator that runs by a sixth too fast is
+noticed by then [use]."""
 JOURNAL_SHOWN: Final = 50
 """Entries of the journal in a snapshot, the latest ones [tuned]."""
 BEHIND_WORTH_SAYING_S: Final = 5.0

@@ -10,6 +10,8 @@ from onboard.daemon.learning.diagnoses import Diagnoses
 from onboard.daemon.learning.handover import Handover
 from onboard.daemon.learning.learner import Learner
 from onboard.daemon.learning.store import Store
+from onboard.daemon.process.calendar import Calendar
+from onboard.daemon.process.company import Company
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
 from onboard.daemon.process.signing_file import SigningFile
@@ -24,6 +26,7 @@ from onboard.daemon.setup import settings
 from onboard.daemon.setup.configuration import Configuration
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.traffic import Traffic
+from onboard.errors import DiskError
 from onboard.mavlink.autopilot import Participant
 from onboard.mavlink.board import Board
 from onboard.mavlink.link import Link
@@ -37,17 +40,20 @@ from onboard.push.journal import Journal
 class Parts:
     """Everything that a service is made of but its outlets, which look at the whole of it."""
 
+    calendar: Calendar
     notices: Notices
     recorder: Recorder | None
     signing: Signing | None
     signing_file: SigningFile
     link: Link
     board: Board
+    company: Company
     streams: Streams
     parameters: ParameterWatch
     observed: Observed
     traffic: Traffic
     journal: Journal
+    ledger: Ledger
     witness: Witness
     proposals: Proposals
     pusher: Pusher
@@ -75,31 +81,36 @@ class Parts:
             StateError: the journal is locked or damaged.
         """
         directory = configuration.state.path()
-        notices, witness, board = Notices(wall_clock), Witness(), Board()
+        calendar = Calendar(wall_clock, clock)
+        notices, witness, board = Notices(calendar), Witness(), Board()
         parameters, observed, traffic = ParameterWatch(), Observed(), Traffic()
         signing_file = SigningFile(directory / "signing.json")
         signing = settings.signing(configuration.link, wall_clock, signing_file.load())
         recorder = _recorder(configuration, notices, wall_clock)
         link = _link(configuration, signing, recorder, clock, wall_clock)
-        ledger = Ledger(journal := Journal(directory / "journal.jsonl"), wall_clock)
+        ledger = Ledger(journal := Journal(directory / "journal.jsonl"), calendar)
         proposals = _proposals(configuration, ledger)
         pusher = Pusher(ledger, proposals, witness, notices)
+        company = Company(link, board, parameters)
         situation = Situation(link, board, parameters, witness, proposals)
-        handover = _handover(configuration, notices, situation, clock, wall_clock)
+        handover = _handover(configuration, notices, situation, clock, calendar)
         link.presence.held = lambda: pusher.busy
         link.presence.committed = lambda: pusher.has_written or handover.has_learned
         return cls(
+            calendar=calendar,
             notices=notices,
             recorder=recorder,
             signing=signing,
             signing_file=signing_file,
             link=link,
             board=board,
+            company=company,
             streams=Streams(settings.stream_requests(configuration.link.rates)),
             parameters=parameters,
             observed=observed,
             traffic=traffic,
             journal=journal,
+            ledger=ledger,
             witness=witness,
             proposals=proposals,
             pusher=pusher,
@@ -107,12 +118,14 @@ class Parts:
             handover=handover,
             vigilance=Vigilance(
                 link,
-                board,
+                company,
                 observed,
                 signing,
                 handover.repetitions,
                 Hindrance(link, parameters, traffic, has_key=signing is not None),
                 handover.failures,
+                ledger,
+                lambda: handover.unsaved,
                 notices,
             ),
         )
@@ -157,7 +170,11 @@ def _recorder(
     configuration: Configuration, notices: Notices, wall_clock: Callable[[], float]
 ) -> Recorder | None:
     directory = configuration.state.path()
-    recorder = settings.recorder(configuration.recording, directory, wall_clock)
+    try:
+        recorder = settings.recorder(configuration.recording, directory, wall_clock)
+    except DiskError as error:  # no reason to leave the vehicle without a calibration
+        notices.post("recording_stopped", f"nothing is recorded: {error}", warning=True)
+        return None
     if recorder is not None:
         recorder.tell = lambda text: notices.post("recording_stopped", text, warning=True)
     return recorder

@@ -106,6 +106,11 @@ class Portrait:
 
     def sentence(self, now: float) -> str:
         """One line for systemctl status."""
+        disk = self.parts.vigilance.disk
+        return "; ".join(text for text in (disk, self._doing(now)) if text)
+
+    def _doing(self, now: float) -> str:
+        """What it does, in a few words."""
         if self.parts.link.autopilot is None:
             return "waiting for an autopilot's heartbeat"
         if self.parts.vigilance.stopped:

@@ -75,7 +75,9 @@ class Service:
         )
         self._turns = turns_here()
         self._stalls_told, self._tell_stalls_at = 0, 0.0
-        self._portrait = Portrait(self.parts, self._outlets, self._life, self._turns, wall_clock)
+        self._portrait = Portrait(
+            self.parts, self._outlets, self._life, self._turns, self.parts.calendar
+        )
         self._notifier = Notifier.from_environment()
         self._kept_aside = FailureRecording(
             self.link, configuration.state.path() / "after-failure", wall_clock
@@ -266,6 +268,7 @@ class Service:
         if self.handover.decoder.source != (message.get_srcSystem(), message.get_srcComponent()):
             return
         self.parts.traffic.count(message.get_type())
+        self.parts.calendar.feed(message)
         if is_autopilot(message):
             self.contact.heartbeat(now, armed=is_armed(message))
         observe = self.parts.observed.feed

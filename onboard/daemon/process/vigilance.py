@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from onboard.daemon.learning.failures import Failures
 from onboard.daemon.process import limits
+from onboard.daemon.process.company import Company
 from onboard.daemon.process.condition import Observed
 from onboard.daemon.process.hindrance import Hindrance
+from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.autopilot import AutopilotState
-from onboard.mavlink.board import Board
 from onboard.mavlink.link import Link
 from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
@@ -21,6 +22,8 @@ UNSIGNED = (
 
 
 STOPPED = "learner_stopped"
+SAID = frozenset({STOPPED, "not_saved", "no_journal"})
+"""What is told elsewhere when it begins, with its cause."""
 
 
 class Vigilance:
@@ -28,33 +31,39 @@ class Vigilance:
 
     Args:
         link: what is heard, and of whom.
-        board: which board it says that it is.
+        company: whether two autopilots answer to its name.
         observed: the vehicle's condition.
         signing: the key's bookkeeping, None without a key.
         repetitions: samples with one time stamp and different content.
         hindrance: what keeps us from learning or writing.
         failures: of the learner.
+        ledger: what is written down.
+        unsaved: why what is learned is not kept, in a sentence; empty: it is.
         notices: where it is told.
     """
 
     def __init__(
         self,
         link: Link,
-        board: Board,
+        company: Company,
         observed: Observed,
         signing: Signing | None,
         repetitions: Repetitions,
         hindrance: Hindrance,
         failures: Failures,
+        ledger: Ledger,
+        unsaved: Callable[[], str],
         notices: Notices,
     ) -> None:
         self._link = link
-        self._board = board
+        self._company = company
         self._observed = observed
         self._signing = signing
         self._repetitions = repetitions
         self._hindrance = hindrance
         self._failures = failures
+        self._ledger = ledger
+        self._unsaved = unsaved
         self._notices = notices
         self._told: set[str] = set()
 
@@ -63,7 +72,7 @@ class Vigilance:
         self._hindrance.look(now)
         found = dict(self._found(now))
         for kind, text in found.items():
-            if kind not in self._told and kind != STOPPED:  # which was said, with its cause
+            if kind not in self._told and kind not in SAID:
                 self._notices.post(kind, text, warning=True)
         self._told = set(found)
 
@@ -75,6 +84,12 @@ class Vigilance:
     def stopped(self) -> str:
         """Why nothing is learned before the next flight, in a sentence; else empty."""
         return self._failures.stopped
+
+    @property
+    def disk(self) -> str:
+        """Why nothing can be written to the vehicle whatever is learned, in a sentence."""
+        trouble = self._ledger.trouble
+        return f"nothing is written to the vehicle: {trouble}" if trouble else ""
 
     def hindered(self, now: float) -> str:
         """What keeps anything from being learned or written now, in a sentence; else empty."""
@@ -93,6 +108,10 @@ class Vigilance:
             yield "unsigned_network", f"{open_ones}: {UNSIGNED}"
         if self.stopped:
             yield STOPPED, self.stopped
+        if self.disk:
+            yield "no_journal", self.disk
+        if self._unsaved():
+            yield "not_saved", self._unsaved()
         yield from self._hindered(now)
         rivals = self._link.presence.rivals(now)
         if rivals:
@@ -103,7 +122,7 @@ class Vigilance:
                 "heartbeats_contradict",
                 "heartbeats say armed and disarmed at the same time: nothing is written",
             )
-        if self._board.are_two(now) and self._link.autopilot is not None:
+        if self._company.are_two(now) and self._link.autopilot is not None:
             yield (
                 "two_vehicles",
                 (

@@ -49,6 +49,10 @@ class Duties:
     def _open(self) -> bool:
         return any(self.not_before.get(r.transaction) != math.inf for r in self._ledger.open)
 
+    def mended(self) -> None:
+        """The disk takes the journal again: what waited for that waits no longer."""
+        self.not_before.clear()
+
     def begin(self) -> None:
         """An autopilot is there (again): pauses are over, and pushes have to show."""
         self.not_before.clear()
@@ -111,12 +115,14 @@ class Duties:
             if now >= self.not_before.get(recovery.transaction, now):
                 self._ledger.open.remove(recovery)
                 return recovery
+        if self._ledger.trouble:  # only what is on the disk as open has its way back there
+            return None
         lost = self.aftercare.lost
         return lost.pop(next(iter(lost))) if lost else None
 
     def take_back(self, now: float) -> Planned | None:
         """The first push that a flight found worse, unless it was tried in vain just now."""
-        if not self._ledger.condemned:
+        if not self._ledger.condemned or self._ledger.trouble:
             return None
         imu, planned = next(iter(self._ledger.condemned.items()))
         return planned if now >= self._proposals.standing(imu).not_before else None
@@ -132,7 +138,9 @@ class Duties:
         if outcome.open:  # once more after a pause; of another vehicle when one turns up anew
             other = outcome.result is Result.OTHER_VEHICLE
             pause_ends = self._proposals.standing(imu).not_before
-            self.not_before[outcome.transaction] = math.inf if other else pause_ends
+            # While its end cannot be written down, it would be taken up for ever.
+            waits = other or bool(self._ledger.trouble)
+            self.not_before[outcome.transaction] = math.inf if waits else pause_ends
         if outcome.result is Result.COMPLETED:
             self.aftercare.wrote(imu, outcome.transaction)
         condemned = self._ledger.condemned.get(imu)

@@ -8,10 +8,12 @@ anew whenever it may have changed, so that nothing is remembered in two places.
 from __future__ import annotations
 
 import logging
+import math
 import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
+from onboard.daemon.pushing import limits
 from onboard.errors import StateError
 from onboard.push.entries import (
     Entry,
@@ -47,8 +49,37 @@ class Ledger:
         """Transactions that have to be taken up."""
         self.condemned: dict[int, Planned] = {}
         """Pushes in force that a flight found worse, by accelerometer."""
+        self.mended = 0
+        """How often the disk took the journal again."""
         self._journal = journal
         self._wall_clock = wall_clock
+        self._try_at = -math.inf
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing can be written down, and so no transaction begins; empty: it can."""
+        why = self._journal.trouble
+        return f"the disk does not take the journal ({why})" if why else ""
+
+    def tend(self, now: float, *, doubted: bool) -> None:
+        """See now and then whether a disk in trouble takes the journal again.
+
+        Args:
+            now: monotonic, s.
+            doubted: the disk has not taken something else: does it take the journal?
+        """
+        before = self._journal.trouble
+        if now < self._try_at or not (before or doubted):
+            return
+        self._try_at = now + limits.DISK_TRIED_S
+        try:
+            self._journal.settle()
+        except StateError as error:
+            if not before:
+                logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            return
+        if before:
+            self.mended += 1
 
     @property
     def entries(self) -> tuple[tuple[float, Entry], ...]:
@@ -56,13 +87,21 @@ class Ledger:
         return self._journal.entries
 
     def append(self, entry: Entry) -> JournalWritten | JournalFailed:
-        """Write to the journal; a disk that does not take it is counted and logged."""
+        """Write to the journal; a disk that does not take it is counted and logged.
+
+        What a flight or a person says, and no transaction, is owed to it: it holds all the same.
+        """
+        at, before = self._wall_clock(), self._journal.trouble
         try:
-            self._journal.append(entry, self._wall_clock())
+            self._journal.append(entry, at)
         except StateError as error:
             self.counters["journal_failed"] += 1
-            logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            if not before:
+                logger.error("%s", error)  # noqa: TRY400 - a full disk is no bug of ours
+            self._journal.owe(entry, at)
             return JournalFailed(str(error))
+        if before:
+            self.mended += 1
         return JournalWritten()
 
     def refused(self, imu: int, why: str) -> None:

@@ -23,6 +23,11 @@ IN_VAIN: Final = 24
 """Questions in a row, of names that are there, without one answer: where a third of all frames is
 lost both ways, 0.56 of them are in vain, so many in a row once in a million times [probability]."""
 
+# The disk
+
+DISK_TRIED_S: Final = 10.0
+"""s between two tries of a disk that does not take the journal [cost: 16 kB written each time]."""
+
 # Proposals
 
 WAIT_AFTER_FAILURE_S: Final = (30.0, 60.0, 120.0, 300.0)

@@ -7,6 +7,7 @@ any PARAM_VALUE; this only causes them, and knows what is still missing.
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
@@ -17,6 +18,7 @@ from onboard.daemon.pushing import limits
 from onboard.mavlink.dialect import COMPONENT, Message, mavlink
 from onboard.mavlink.parameter_messages import (
     SendAction,
+    ValueReceived,
     parameter_event,
     parameter_message,
 )
@@ -27,6 +29,7 @@ from onboard.mavlink.parameters import (
     ValueChanged,
     ValueRead,
 )
+from onboard.mavlink.twofold import TELLING, Twofold
 from onboard.push.policy import context_names
 
 logger = logging.getLogger(__name__)
@@ -57,6 +60,7 @@ KNOWLEDGE = (
     "EK3_IMU_MASK",
     "EK3_PRIMARY",
     *sorted(views.ASKED),
+    *TELLING,
 )
 """Good to have, in a recording too; under one of two names, by version; the last ones of planes."""
 NEEDED = frozenset((*REQUIRED, *MEANING, *KNOWLEDGE))
@@ -70,6 +74,9 @@ class ParameterWatch:
     def __init__(self) -> None:
         self.counters: Counter[str] = Counter()
         self.enabled = True
+        self.twofold = Twofold()
+        self._asked_again: dict[str, float] = {}
+        self._to_ask: dict[str, float] = {}
         self._client = ParameterClient()
         self._codec = mavlink.MAVLink(None)
         self._target: tuple[int, int] | None = None
@@ -109,7 +116,10 @@ class ParameterWatch:
         """Read everything (anew): the autopilot may have rebooted, or be another."""
         if self._target != (system, component):
             self._client = ParameterClient()
+            self.twofold.forget()
         self._target = (system, component)
+        self._asked_again.clear()
+        self._to_ask.clear()
         self._client.cancel()
         self._absent.clear()
         self._answered.clear()
@@ -128,6 +138,8 @@ class ParameterWatch:
             own_system=system,
             own_component=COMPONENT,
         )
+        if isinstance(event, ValueReceived):
+            self.twofold.take(event.name, event.value, now)
         return () if event is None else self._act(self._client.feed(event, now), now)
 
     def poll(self, now: float) -> Sequence[Message]:
@@ -135,6 +147,8 @@ class ParameterWatch:
         if self._target is None or not self.enabled:
             return ()
         messages = self._act(self._client.tick(now), now)
+        late = [name for name, due in self._to_ask.items() if due <= now]
+        messages += self._ask_again(late, now) if late else []
         if now >= self._next_read:
             self._next_read = now + limits.REREAD_S
             for names, attempts in (
@@ -170,7 +184,12 @@ class ParameterWatch:
                     # ArduPilot answers reads from a queue, with the values of when they were asked:
                     # an answer can be older than the announcement before it.  What nobody asked for
                     # is taken, and asked for.
-                    messages += self._act(self._client.read((name,), now), now)
+                    # Of two autopilots each contradicts the other for ever: not more than so often.
+                    due = self._asked_again.get(name, -math.inf) + limits.RETRY_S
+                    if now >= due:
+                        messages += self._ask_again((name,), now)
+                    else:
+                        self._to_ask[name] = due
                 case _ if isinstance(output, SendAction):
                     messages.append(self._encode(output))
                     # Silence is the usual answer to a name that not every firmware has.
@@ -180,6 +199,12 @@ class ParameterWatch:
                 case _:
                     pass
         return messages
+
+    def _ask_again(self, names: Sequence[str], now: float) -> list[Message]:
+        for name in names:
+            self._asked_again[name] = now
+            self._to_ask.pop(name, None)
+        return self._act(self._client.read(names, now), now)
 
     def _encode(self, action: SendAction) -> Message:
         system, component = self._target or (0, 0)

@@ -77,6 +77,10 @@ class Refusals(Protocol):
     def refused(self, imu: int, why: str) -> None:
         """A refusal begins, or ends (then with nothing to say)."""
 
+    @property
+    def trouble(self) -> str:
+        """Why nothing is remembered at all, and so nothing may be written; empty: it is."""
+
 
 class Proposals:
     """The current proposals and what people said about them.
@@ -111,10 +115,14 @@ class Proposals:
         self._standing: dict[int, Standing] = {}
         self._plans: dict[int, tuple[tuple[object, ...], PushPlan]] = {}
         self._refusals = refusals
-        for imu, why in (refusals.refusals() if refusals is not None else {}).items():
-            self.standing(imu).refused = why
+        self.recall()
         self._flight: JudgedFlight | None = None
         self._parameters: Mapping[str, float] = {}
+
+    def recall(self) -> None:
+        """Take up what was refused before, as far as it is remembered."""
+        for imu, why in (self._refusals.refusals() if self._refusals is not None else {}).items():
+            self.standing(imu).refused = why
 
     def update(
         self,
@@ -346,6 +354,8 @@ class Proposals:
         found: dict[str, str] = {}
         if self.forbidden:
             found["advise_only"] = self.forbidden
+        if self._refusals is not None and self._refusals.trouble:
+            found["no_journal"] = self._refusals.trouble
         if self.doubt:
             found["doubtful"] = self.doubt
         if self._imus and imu not in self._imus:

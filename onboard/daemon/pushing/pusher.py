@@ -79,6 +79,7 @@ class Pusher:
         self._parameters: Mapping[str, float] = {}
         self._duties = Duties(ledger, proposals, witness, notices)
         self._closing = self._silent = False
+        self._mended = ledger.mended
         self.idle = self._writer.idle
         self._read_ledger()
 
@@ -187,6 +188,12 @@ class Pusher:
         )
         if self.busy or self._closing or self._proposals.forbidden:
             return
+        if self._ledger.mended != self._mended:
+            self._mended = self._ledger.mended
+            self._proposals.recall()  # by a journal that could not be read before
+            self._duties.mended()
+            self._read_ledger()
+            return  # proposals are made anew first
         if self._duties.look(parameters, parameters.keys() if confirmed is None else confirmed):
             self._read_ledger()
         self._start_what_is_due(now)
@@ -217,6 +224,8 @@ class Pusher:
             raise RefusedError(f"pushes of {named(chosen)} are in force: one at a time")
         if self._writer.target is None or self._proposals.forbidden:
             raise RefusedError(self._proposals.forbidden or "no autopilot is heard")
+        if self._ledger.trouble:
+            raise RefusedError(self._ledger.trouble)
         if self._silent:
             raise RefusedError("the autopilot is silent: nothing can be rolled back now")
         if self.busy or self._duties.unfinished:

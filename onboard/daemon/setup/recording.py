@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import re
 import shutil
@@ -9,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from onboard.errors import StateError
+from onboard.errors import disk_error
 from onboard.mavlink.recorder import Recorder
 
 LEFT_FREE = 50_000_000
@@ -30,7 +31,8 @@ class RollingRecorder(Recorder):
 
     Raises:
         StateError: the directory cannot be made.
-        EndpointError: the file cannot be created.
+        ConfigurationError: the file cannot be created.
+        DiskError: either, and that is the disk's fault.
     """
 
     def __init__(
@@ -44,13 +46,14 @@ class RollingRecorder(Recorder):
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise StateError(f"{directory}: {error.strerror}") from None
+            raise disk_error(directory, error) from None
         self._directory = directory
         self._keep = keep
         self._file_bytes = file_bytes
         self._wall_clock = wall_clock
         super().__init__(self._next_path())
-        self._prune()
+        with contextlib.suppress(OSError):  # it is tried again at the next file
+            self._prune()
 
     def _append(self, block: bytearray) -> None:
         """On the recorder's thread: write, then roll over if the file has its size."""

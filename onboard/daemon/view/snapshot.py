@@ -15,6 +15,9 @@ from onboard.answers.calibration_document import WorthDocument
 
 Three: TypeAlias = tuple[float | None, float | None, float | None]
 SCHEMA = "onboard.state/1"
+DATED_FROM = 1_600_000_000.0
+"""Unix time, s; what is dated before that, years before there was this program, was dated by a
+clock that nobody had set, and its date is not known [bound]."""
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):

@@ -54,6 +54,7 @@ FLY_ON = "fly on with GPS trusted, changing speed and direction often"
 FLY_AGAIN = "fly again: the next flight decides on these values"
 TO_DO: Final[Mapping[str, str]] = MappingProxyType(
     {
+        "no_journal": "see to the companion's disk: it is full, read-only or failing",
         "doubtful": "find out who else sends, then reset what was learned",
         "temperature_learning": "let the autopilot finish its temperature calibration",
         "temperature_reference_unknown": "calibrate the accelerometers on the bench once",

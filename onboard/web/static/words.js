@@ -58,13 +58,18 @@ export function duration(seconds) {
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+/** What is dated before that was dated by a clock that nobody had set (as in snapshot.py). */
+const DATED_FROM = 1600000000;
+
 /** Unix time as the clock of whoever reads. */
 export function clockTime(unix) {
+  if (unix < DATED_FROM) return "--:--:--";
   return new Date(unix * 1000).toLocaleTimeString([], { hour12: false });
 }
 
 /** Unix time as day and clock of whoever reads. */
 export function moment(unix) {
+  if (unix < DATED_FROM) return "date not known";
   return new Date(unix * 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
