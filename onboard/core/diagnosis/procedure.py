@@ -38,7 +38,7 @@ from onboard.core.diagnosis.records import Diagnosis, Unused
 from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.diagnosis.settling import families_of, only, settled
+from onboard.core.diagnosis.settling import families_of, only, opened, settled
 from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.diagnosis.twice import jumped_twice
 from onboard.core.estimate.calibrator import Calibrator
@@ -93,6 +93,7 @@ def examine(
     steady = without_shadows(FinalModel(final, families, origin, calibrator.parameters))
     if len(steady) < len(families):
         final, families = only(full, steady, final)
+    final, families = opened(full, families, final)
     return Judge(
         calibrator,
         imu,
