@@ -106,7 +106,10 @@ class Secret:
     def _curve(self, cold: float) -> concealed.TemperatureDrift:
         """Each axis off by about what a straight drift makes of it, by any of three powers."""
         rng = np.random.default_rng([self.seed, 978])
-        units, reach = UNITS[TemperatureDrift.name][self.vehicle], TemperatureDrift.reference - cold
+        units, reach = (
+            UNITS[TemperatureDrift.name][self.vehicle],
+            TemperatureDrift().reference - cold,
+        )
         powers = []
         for unit in units.values():
             shares = rng.dirichlet((1.0, 1.0, 1.0)) * rng.choice([-1.0, 1.0], 3)
