@@ -35,6 +35,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.physics.finding import Finding
 from onboard.mavlink.decode import Decoder
+from sitl.builtin.effects import TemperatureDrift
 from sitl.recording import Flight, FlightSpec, run, sent, truth_record
 
 TIMING = ("gps_latency", "gps_smoothing", "imu_delay")
@@ -135,6 +136,8 @@ def _true_unknowns(record: dict[str, Any], truth: dict[str, Any]) -> dict[str, f
             return {k: record[k] for k in "xyz"}
         case "saturation":
             return {"limit": record["limit"]}
+        case "gps_overshoot":
+            return {"square": record["square"]}
     skip = {"name", "imu", "reference", "square", "cube", "width", "damping"}
     return {k: float(v) for k, v in record.items() if k not in skip}
 
@@ -145,7 +148,8 @@ def _measured(truth: dict[str, Any], said: Diagnosis) -> Iterable[Measured]:
         effect = by_name.get(record["name"])
         if effect is None:
             continue
-        if any(record.get("square", ())) or any(record.get("cube", ())):
+        curved = record["name"] == TemperatureDrift.name
+        if curved and (any(record["square"]) or any(record["cube"])):
             yield from _along_curve(record, effect)
             continue
         for key, true in _true_unknowns(record, truth).items():
