@@ -8,6 +8,9 @@ found.  What a flight cannot show by nature is declared here, before any recordi
 * gravity beside a z offset takes steep turns for minutes: a unit is more than any place on earth;
 * curvature of the scale and a bending mount need load factors: a copter flies near one;
 * a multicopter's drag changes how it flies, not what its sensors read.
+
+Apart from that challenge there is one of what it has not got (:class:`Harder`): offsets that follow
+the temperature along a curve, alone and beside another effect, and clipping beside another effect.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from typing import Any, Literal
 import numpy as np
 
 from sitl.builtin import effects as concealed
+from sitl.builtin.effects import TemperatureDrift
 from sitl.builtin.truth import GpsTruth, random_imus
 from sitl.builtin.world import Vehicle
 from sitl.recording import FlightSpec
@@ -40,6 +44,8 @@ SHAKEN = (4.0, 4.0, 6.0)
 CONCEALED = {kind.name: kind for kind in concealed.ALL if kind.units}
 UNITS: dict[str, Mapping[str, Mapping[str, float]]] = {n: k.units for n, k in CONCEALED.items()}
 """Sizes of one unit by effect, vehicle and unknown, as the concealed effects state them."""
+HALF_WARMED_K = 15.0
+"""Half of the range of temperatures of most flights: beyond 35 degC they warm up by as much."""
 RAILS: dict[Level, tuple[float, float]] = {
     "small": (13.0, 14.0),
     "medium": (11.6, 12.0),
@@ -64,6 +70,7 @@ class Secret:
     kind: Literal["control", "single", "pair", "nameless"]
     names: tuple[str, ...] = ()
     level: Level = "medium"
+    curved: bool = False
 
     @property
     def testable(self) -> bool:
@@ -75,12 +82,15 @@ class Secret:
         rng = np.random.default_rng([self.seed, 977])
         duration = float(rng.uniform(150.0, 300.0))
         delay = STAMPED_EARLY + float(rng.uniform(*NET_DELAY))
-        effects = tuple(self._effect(name, rng, duration) for name in self.names)
+        straight = [n for n in self.names if not (self.curved and n == TemperatureDrift.name)]
+        effects = tuple(self._effect(name, rng, duration) for name in straight)
         warming = {
             "temperature_start": float(rng.uniform(5.0, 30.0)),
             "temperature_end": float(rng.uniform(40.0, 55.0)),
             "temperature_time": float(rng.uniform(0.15, 0.4) * duration),
         }
+        if self.curved:
+            effects = (*effects, self._curve(warming["temperature_start"]))
         imus = tuple(replace(imu, **warming) for imu in random_imus(self.seed))
         if "vibration_rectification" in self.names:
             imus = tuple(replace(imu, vibration=SHAKEN) for imu in imus)
@@ -92,6 +102,21 @@ class Secret:
             gps=GpsTruth(delay=delay, stamped_early=STAMPED_EARLY),
             effects=effects,
         )
+
+    def _curve(self, cold: float) -> concealed.TemperatureDrift:
+        """Each axis off by about what a straight drift makes of it, by any of three powers."""
+        rng = np.random.default_rng([self.seed, 978])
+        units, reach = (
+            UNITS[TemperatureDrift.name][self.vehicle],
+            TemperatureDrift().reference - cold,
+        )
+        powers = []
+        for unit in units.values():
+            shares = rng.dirichlet((1.0, 1.0, 1.0)) * rng.choice([-1.0, 1.0], 3)
+            most = unit * float(rng.uniform(*LEVELS[self.level]))
+            powers.append(most * shares / max(reach, HALF_WARMED_K) ** np.arange(3))
+        (x, y, z), square, cube = np.array(powers).T.tolist()
+        return TemperatureDrift(x=x, y=y, z=z, square=tuple(square), cube=tuple(cube))
 
     def _effect(self, name: str, rng: Rng, duration: float) -> concealed.Effect:
         if self.kind == "nameless":
@@ -166,6 +191,45 @@ class Challenge:
                 (names[i % len(names)],),
                 "large",
             )
+
+
+@dataclass(frozen=True, slots=True)
+class Harder:
+    """What :class:`Challenge` has not got, so many recordings of each kind."""
+
+    first: int
+    curves: int = 12
+    curved_pairs: int = 16
+    clipped_pairs: int = 16
+    clipped_curves: int = 4
+    levels: tuple[Level, ...] = ("small", "medium", "large")
+    vehicles: tuple[Vehicle, ...] = field(default=("copter", "plane"))
+
+    def secrets(self) -> list[Secret]:
+        """All of them, shuffled: any part of the list is a fair sample."""
+        rng = np.random.default_rng([self.first, 7])
+        curve, clips = TemperatureDrift.name, concealed.Saturation.name
+        counts = (self.curves, self.curved_pairs, self.clipped_pairs, self.clipped_curves)
+        kinds = ((curve,), (curve, ""), (clips, ""), (clips, curve))
+        out = []
+        for names, count in zip(kinds, counts, strict=True):
+            for i in range(count):
+                vehicle = self.vehicles[i % len(self.vehicles)]
+                level = self.levels[(i // len(self.vehicles)) % len(self.levels)]
+                able = [n for n in UNITS if vehicle in UNITS[n] and not CONCEALED[n].alone]
+                beside = [n for n in able if n != curve and not _alike(n, names[0])]
+                other = beside[int(rng.integers(len(beside)))]
+                out.append(
+                    Secret(
+                        self.first + len(out),
+                        vehicle,
+                        "single" if len(names) == 1 else "pair",
+                        tuple(n or other for n in names),
+                        level,
+                        curve in names,
+                    )
+                )
+        return [out[i] for i in rng.permutation(len(out))]
 
 
 def _alike(one: str, other: str) -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.challenge import Measured, answers, kept, named, parser, summary
-from benchmarks.concealing import LEVELS, Challenge, Secret
+from benchmarks.concealing import LEVELS, Challenge, Harder, Secret
 from benchmarks.numbers import (
     NUMBERS_HEAD,
     NUMBERS_LEGEND,
@@ -35,6 +35,7 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.maths.compiling import prefer_compiled
 from onboard.core.physics.finding import Finding
 from onboard.mavlink.decode import Decoder
+from sitl.builtin.effects import TemperatureDrift
 from sitl.recording import Flight, FlightSpec, run, sent, truth_record
 
 TIMING = ("gps_latency", "gps_smoothing", "imu_delay")
@@ -135,6 +136,8 @@ def _true_unknowns(record: dict[str, Any], truth: dict[str, Any]) -> dict[str, f
             return {k: record[k] for k in "xyz"}
         case "saturation":
             return {"limit": record["limit"]}
+        case "gps_overshoot":
+            return {"square": record["square"]}
     skip = {"name", "imu", "reference", "square", "cube", "width", "damping"}
     return {k: float(v) for k, v in record.items() if k not in skip}
 
@@ -145,10 +148,29 @@ def _measured(truth: dict[str, Any], said: Diagnosis) -> Iterable[Measured]:
         effect = by_name.get(record["name"])
         if effect is None:
             continue
+        curved = record["name"] == TemperatureDrift.name
+        if curved and (any(record["square"]) or any(record["cube"])):
+            yield from _along_curve(record, effect)
+            continue
         for key, true in _true_unknowns(record, truth).items():
             q = effect.unknowns.get(key)
             if q is not None:
                 yield Measured(f"{record['name']}.{key}", true, q.value, q.sigma, abs(true))
+
+
+def _along_curve(record: dict[str, Any], effect: Finding) -> Iterable[Measured]:
+    """A curve where the flight began, half way and where it ended: what its size is has a slope."""
+    curve = effect.response_curve
+    if curve is None:
+        return
+    u = curve.x - record["reference"]
+    for k, axis in enumerate("xyz"):
+        true = record[axis] * u + record["square"][k] * u**2 + record["cube"][k] * u**3
+        size = float(np.ptp(true))
+        for at in (0, len(u) // 2, -1):
+            name = f"{record['name']}.{axis} at {curve.x[at]:.0f} degC"
+            value, sigma = float(curve.y[axis][at]), float(curve.sigma[axis][at])
+            yield Measured(name, float(true[at]), value, sigma, size)
 
 
 def _onsets(truth: dict[str, Any], said: Diagnosis, calibrator: Calibrator) -> Iterable[float]:
@@ -258,9 +280,12 @@ def describe(o: Outcome) -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Command line."""
     options = parser("Sealed challenge of concealed effects.", count=40, first=1000)
+    options.add_argument(
+        "--harder", action="store_true", help="curves over the temperature, clipping beside others"
+    )
     chosen = options.parse_args(arguments)
     prefer_compiled()  # as the commands do
-    secrets = Challenge(chosen.first).secrets()
+    secrets = (Harder if chosen.harder else Challenge)(chosen.first).secrets()
     secrets = secrets[: chosen.count or len(secrets)]
 
     def tell(o: Outcome) -> str:

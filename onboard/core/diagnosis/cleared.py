@@ -19,7 +19,7 @@ from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
-from onboard.core.inputs.expected_force import drowned, expected, spectrum, white
+from onboard.core.inputs.expected_force import drowned, expected, spectrum, swung, tones, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
@@ -210,12 +210,19 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     """A flight examined with the force that its samples let one expect, or as it was sampled.
 
     What may be noise in the samples may be real, too: of noise there is no more than the velocity
-    walks by, and the flight is taken as its velocity is likelier.
+    walks by, and the flight is taken as its velocity is likelier.  So it is with a tone.
     """
-    density = spectrum(batches)
     sampled = asked.examined(batches)
+    density = spectrum(batches)
     if density is None:
         return sampled
+    tone, fixes = tones(density), sum(len(b.fixes) for b in batches)
+    # Of what not even the best receiver could tell, nothing is asked.
+    if fixes * np.sum((swung(batches, tone) / LIMITS["velocity"][0]) ** 2) > CLEARLY:
+        toneless = asked.examined(expected(batches, density, tone), sampled)
+        if toneless.log_likelihood > sampled.log_likelihood:
+            sampled, batches = toneless, toneless.batches
+            density = np.maximum(density - tone, np.min(density, axis=0))
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
     if little and not drowned(batches, density):
         return sampled

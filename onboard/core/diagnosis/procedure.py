@@ -38,7 +38,7 @@ from onboard.core.diagnosis.records import Diagnosis, Unused
 from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
-from onboard.core.diagnosis.settling import families_of, only, settled
+from onboard.core.diagnosis.settling import families_of, only, opened, settled
 from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.diagnosis.twice import jumped_twice
 from onboard.core.estimate.calibrator import Calibrator
@@ -93,6 +93,7 @@ def examine(
     steady = without_shadows(FinalModel(final, families, origin, calibrator.parameters))
     if len(steady) < len(families):
         final, families = only(full, steady, final)
+    final, families = opened(full, families, final)
     return Judge(
         calibrator,
         imu,
@@ -239,9 +240,8 @@ def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examinati
             other.common = jump if common and any(c.columns is jump for c in other.chosen) else None
             other.tried = jump
             return wide, other
-        steady = [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
         known = any(shock.name == f.name for f in full.carried)
-        if known or not explains(full, steady, shock):
+        if known or not explains(full, _steady(choice), shock):
             break
         full = full.carrying(shock)
         choice = _chosen(full, asked.testable)
@@ -285,7 +285,8 @@ def _jump(full: Examination, choice: Choice, asked: _Asked) -> BiasStep | None:
 
     Noise is estimated with every column of the catalogue in, so that nothing that is missing passes
     for noise; a jump is no column until its moment is known.  It is looked for beside nothing else:
-    something with unknowns enough may have stood in for it.
+    something with unknowns enough may have stood in for it.  Only what was chosen beside one has
+    not, and may move it: axes that are not square make up for a jump at another moment.
     """
     if len(full.blocks) < FEWEST_BLOCKS:
         return None
@@ -296,7 +297,16 @@ def _jump(full: Examination, choice: Choice, asked: _Asked) -> BiasStep | None:
     best = max(looked, key=lambda at: at.gain)
     if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < -2.0 * log(SEARCHED):
         return None
-    return jump_near(full, (), best.moment, reach_of_scan(looked))
+    jump = jump_near(full, (), best.moment, reach_of_scan(looked))
+    beside = _steady(choice)
+    if beside and any(c.jump for c in choice.chosen):
+        jump = jump_near(full, beside, jump.moment, reach_of_scan(looked))
+    return jump
+
+
+def _steady(choice: Choice) -> list[Effect]:
+    """What was chosen that is no change of the offset."""
+    return [c.columns for c in choice.chosen if c.columns and not c.columns.tilts_ekf]
 
 
 def _wanders(choice: Choice) -> bool:

@@ -36,6 +36,16 @@ def settled(
     return final, families
 
 
+def opened(
+    full: Examination, families: list[Effect], final: Examination
+) -> tuple[Examination, list[Effect]]:
+    """The model that stands with what the laws of its families leave open of the six."""
+    wider = [f.opened() for f in families]
+    if all(a is b for a, b in zip(wider, families, strict=True)):
+        return final, families
+    return only(full, wider, final)
+
+
 def only(
     full: Examination, families: list[Effect], final: Examination
 ) -> tuple[Examination, list[Effect]]:

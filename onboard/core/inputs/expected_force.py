@@ -16,16 +16,30 @@ its own motors, has a force as restless, and its receiver agrees with every sum 
 the velocity that is integrated walk, so that what the receiver finds of such a walk is the most
 that ``q`` can be; whether it is as much, is for the likelihood of what the receiver says to decide
 (:mod:`onboard.core.diagnosis.cleared`).
+
+A *tone* is the other kind: a rotor that is governed, or a motor at constant speed, beats at one
+frequency, and sampled more slowly than that it has another one, at which a vehicle may fly.  Its
+samples are no force there either, and ``q`` is what a line of the spectrum has on top of what lies
+beside it.  A vehicle that really swings has such a line, too, and likelihood decides likewise.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from onboard.core.inputs.joined import joined, runs, times, with_samples
-from onboard.core.inputs.limits import DROWNED, FLOOR_BINS, RESOLVED_S, SPECTRUM_BINS
+from onboard.core.inputs.limits import (
+    DROWNED,
+    FLOOR_BINS,
+    RESOLVED_S,
+    SPECTRUM_BINS,
+    TONE_BESIDE,
+    TONE_BINS,
+    TONE_STANDS_OUT,
+)
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
@@ -48,6 +62,27 @@ def spectrum(batches: Sequence[Batch]) -> Array | None:
 def white(density: Array) -> Array:
     """(3,) density that white noise may have at the most, of a spectrum (bins, 3)."""
     out: Array = _averaged(density, FLOOR_BINS).min(axis=0)
+    return out
+
+
+def tones(density: Array) -> Array:
+    """(bins, 3) density that narrow lines of a spectrum (bins, 3) have on top of what is beside."""
+    there = _averaged(density, SPECTRUM_BINS)
+    out, n = np.zeros_like(there), len(there)
+    # Slower ones have nothing beside them that the window does not smear them into.
+    for i in range(math.ceil(TONE_BINS / (1.0 - 1.0 / TONE_BESIDE)), n):
+        below = there[math.ceil(i / TONE_BESIDE) : i - TONE_BINS + 1].mean(axis=0)
+        above = there[i + TONE_BINS : math.floor(i * TONE_BESIDE) + 1]
+        beside = np.maximum(below, above.mean(axis=0)) if len(above) else below
+        out[i] = np.where(there[i] > TONE_STANDS_OUT * beside, there[i] - beside, 0.0)
+    return out
+
+
+def swung(batches: Sequence[Batch], tone: Array) -> Array:
+    """(3,) m/s, RMS: velocity that tones (bins, 3) of the samples of a flight would be."""
+    step = float(np.median(np.concatenate([np.diff(times(run)) for run in runs(batches)])))
+    f = np.linspace(0.0, 0.5 / step, len(tone))[1:]
+    out: Array = np.sqrt((2.0 * f[0] / (2.0 * np.pi * f) ** 2) @ tone[1:])
     return out
 
 
@@ -80,7 +115,7 @@ def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Bat
     Args:
         batches: the flight.
         density: (bins, 3) of its samples.
-        noise: (3,) density of what of them is white noise.
+        noise: (3,) density of what of them is white noise, or (bins, 3) by frequency.
     """
     gain = _gain(density, noise)
     return with_samples(batches, lambda _, raw: _filtered(raw, gain))

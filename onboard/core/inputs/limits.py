@@ -152,6 +152,14 @@ SPECTRUM_BINS: Final = 3
 FLOOR_BINS: Final = 21
 """The same where the least of it is looked for: the least of many is too small by chance, by a
 tenth [cost]."""
+TONE_BESIDE: Final = 1.5
+"""Ratio of frequencies up to which is looked what lies beside a tone: what a vehicle's motion has
+there is as smooth as its own damping, and rises and falls over tens of per cent [physics]."""
+TONE_BINS: Final = 4
+"""Frequencies on either side over which the window of a spectrum smears a tone [cost]."""
+TONE_STANDS_OUT: Final = 5.0
+"""Times what lies beside it that a tone has.  Of three stretches, the fewest of a flight that is
+judged, one of 1500 frequencies has that by chance once in a thousand flights [probability]."""
 DROWNED: Final = 0.5
 """Share of noise in the force at a frequency of the fixes, in the mean of them, from which it is
 more noise than force [bound]."""

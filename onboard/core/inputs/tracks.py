@@ -156,9 +156,10 @@ class ImuTrack:
         told, warm = self.beside.around(float(t[0]), float(t[-1]))
         times = np.concatenate([t[known], told])
         order = np.argsort(times, kind="stable")
-        if not len(told) or max(times.min() - t[0], t[-1] - times.max()) > SILENT_S:
+        # A sensor that warms up through 0 degC tells that once or twice, and it means unknown.
+        if not len(times) or max(times.min() - t[0], t[-1] - times.max()) > SILENT_S:
             return None
-        return times[order][few], np.concatenate([celsius[known], warm[:, 0]])[order][few]
+        return times[order][few], np.concatenate([celsius[known], warm.reshape(-1)])[order][few]
 
     def _made(self, w_step: float, f_step: float, six: SixParameters, R_bs: Array | None) -> None:
         """Something is added that was made in this manner."""

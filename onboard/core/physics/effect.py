@@ -261,6 +261,13 @@ class Effect(Family):
         """Itself with its first unknowns only: hypotheses of their own, simplest first."""
         return ()
 
+    def opened(self) -> Self:
+        """Itself, once it stands, with what its law leaves open of the numbers beside it.
+
+        No more than that need be found: what a flight does not tell is in their sigmas.
+        """
+        return self
+
     def bent(self, line: ResponseCurve, theta: Array, covariance: Array) -> ResponseCurve:  # noqa: ARG002
         """The response with its shapes: ``line`` has the sizes alone.
 

@@ -88,3 +88,19 @@ def test_temperature_is_that_of_the_coarser_samples_where_the_finer_ones_tell_no
     assert track.warmth(t[silent], rows[silent, 6]) is None, "for too long nobody has told it"
     track.drop_before(10.0)
     assert track.beside.first > 9.0
+
+
+def test_a_sensor_that_warms_up_through_zero_keeps_its_temperature():
+    """Zero means unknown; that of the samples beside them is that of these, too."""
+    track, same = ImuTrack(), SixParameters()
+    for k in range(1000):
+        celsius = round(-2.0 + 0.005 * k, 2)
+        told = replace(sample(0.02 * k, (0.0, 0.0, -9.8), same, None), temperature=celsius or None)
+        assert track.add(told, same, None)
+    t, rows = track.arrays()
+    assert np.isnan(rows[:, 6]).any()
+    times, warm = track.warmth(t, rows[:, 6])
+    np.testing.assert_allclose(warm, -2.0 + 0.25 * times, atol=6e-3)
+    assert times[0] == t[0]
+    assert times[-1] > t[-1] - 0.5
+    assert track.warmth(t, np.full(len(t), np.nan)) is None, "a sensor without a thermometer"

@@ -77,6 +77,27 @@ def test_at_the_reference_it_adds_nothing_to_the_offset_whatever_its_shape(flown
     assert columns(curve, there, t) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize(("flown", "open_"), [((20.0, 50.0), False), ((40.0, 60.0), True)])
+def test_what_is_not_known_beyond_what_was_flown_is_in_the_sigma_of_the_offset(flown, open_):
+    """Of a line nobody has seen that it goes on straight to where the offset is said to be."""
+    curve = TemperatureDrift(ORIGIN).told_by(flight(*flown))
+    line = curve.simpler()[0]
+    whole = line.opened()
+    assert len(whole.unknowns) == (9 if open_ else 3)
+    assert whole.keys == line.keys
+    assert curve.opened().unknowns == curve.unknowns
+    batch = flight(*flown)[3]
+    t = batch.segment.slow["temperature"][0]
+    sigma = {}
+    for effect in (line, whole):
+        made = columns(effect, batch.segment, t)
+        A = np.column_stack([np.ones(len(t)), made[:, 2, 2::3]])
+        sigma[effect] = np.sqrt(np.linalg.inv(A.T @ A)[0, 0])
+    # The offset 5 K below 20 K that were flown; 9 by the bend and 25 by the twist as it is there.
+    assert sigma[whole] >= (5.0 if open_ else 1.0) * sigma[line]
+    assert not TemperatureDrift(ORIGIN).opened().shaped, "without a flight there is no range"
+
+
 def test_its_curve_is_drawn_with_its_shape_and_said_by_its_range():
     warm = flight(20.0, 50.0)
     curve = TemperatureDrift(ORIGIN).told_by(warm)
@@ -120,6 +141,24 @@ def test_warming_up_along_a_curve_is_told_as_temperature(vehicle, square, cube):
         law = square[j] * u**2 + cube[j] * u**3
         off = (curve.y[axis] - law) - np.mean(curve.y[axis] - law)
         assert np.sqrt(np.mean(off**2)) < 0.25 * np.std(law) + 0.01
+    c = found.calibration
+    error = np.array(c.scale + c.offset) - SIX
+    chi_square = error @ np.linalg.solve(c.with_its_gyroscope, error)
+    assert chi_square < 22.5, "of the six at 35 degC: one flight in a thousand"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cold", "warm"), [(44.0, 68.0), (-8.0, 26.0)])
+def test_the_offset_at_a_reference_that_was_not_flown_is_no_surer_than_its_curve(cold, warm):
+    """The second flight also passes 0 degC, which an autopilot tells as a temperature unknown."""
+    imu = replace(IMU, temperature_start=cold, temperature_end=warm, temperature_time=60.0)
+    drift = concealed.TemperatureDrift(
+        x=0.004, y=-0.002, square=(8e-4, -6e-4, 2e-4), cube=(1e-5, -1e-5, -6e-6)
+    )
+    samples = simulated("copter", 200.0, seed=23, imu=imu, effects=[drift])[0]
+    found = answer(fed(samples), 1)
+    (told,) = [e for e in found.diagnosis.effects if e.name != "gps_latency"]
+    assert told.name == "temperature_drift"
     c = found.calibration
     error = np.array(c.scale + c.offset) - SIX
     chi_square = error @ np.linalg.solve(c.with_its_gyroscope, error)

@@ -77,16 +77,25 @@ class TemperatureDrift(Effect):
         seen = curves.slow("temperature")(batches, self.origin.t0)
         # Of a wild sample or two, no range is made.
         low, high = np.percentile(seen, (1, 99)) if len(seen) else self.flown
-        if high - low < LEAST_RANGE_K:
-            return self
         made = copy(self)
         made.flown = (float(low), float(high))
-        return made.with_bends(BENT)
+        return made if high - low < LEAST_RANGE_K else made.with_bends(BENT)
 
     def simpler(self) -> tuple[Self, ...]:
         """With fewer powers: a line, a parabola."""
         names = [n for n in BENT if any(u.name.endswith(f"{n}_x") for u in self.unknowns)]
         return tuple(self.with_bends(names[:k]) for k in range(len(names)))
+
+    def opened(self) -> Self:
+        """With every power, where the reference is not among the temperatures that were flown.
+
+        Between them a curve that was not found is near its line.  Beyond them nobody has seen that
+        it goes on straight, and the offset of the six is said to be that of the reference.
+        """
+        low, high = self.flown
+        if not low < high or low <= self.origin.temperature <= high:
+            return self
+        return self.with_bends(BENT)
 
     def with_bends(self, bent: Sequence[str]) -> Self:
         """The same with some of :data:`BENT`, the first first."""
@@ -113,9 +122,12 @@ class TemperatureDrift(Effect):
         about = self.origin.temperature
         out = [T - about]
         if self.shaped:
-            # Of none of them is anything at the reference, whose offset the six have.
-            at_it = _legendre(np.array(about), self.flown)
-            out += [p - at for p, at in zip(_legendre(T, self.flown), at_it, strict=True)]
+            # Of none of them is anything at the reference, whose offset the six have.  Where that
+            # is far from what was flown, its sigma has what nobody knows of them there.
+            u, at = _within(T, self.flown), float(_within(np.array(about), self.flown))
+            u = np.clip(u, min(-1.0, at), max(1.0, at))
+            at_it = _legendre(np.array(at))
+            out += [p - there for p, there in zip(_legendre(u), at_it, strict=True)]
         return out[: len(self.unknowns) // len(AXES)]
 
     def bent(self, line: ResponseCurve, theta: Array, covariance: Array) -> ResponseCurve:
@@ -150,10 +162,15 @@ class TemperatureDrift(Effect):
         return f"{said}, flown from {low:.0f} to {high:.0f} degC"
 
 
-def _legendre(T: Array, flown: tuple[float, float]) -> tuple[Array, Array]:
-    """Second and third polynomial of temperatures of any shape; beyond those flown, as there."""
+def _within(T: Array, flown: tuple[float, float]) -> Array:
+    """Temperatures of any shape, from -1 at the lowest that was flown to 1 at the highest."""
     low, high = flown
-    u = np.clip((2.0 * T - low - high) / (high - low), -1.0, 1.0)
+    out: Array = (2.0 * T - low - high) / (high - low)
+    return out
+
+
+def _legendre(u: Array) -> tuple[Array, Array]:
+    """Second and third polynomial, of any shape."""
     square = u * u
     return 0.5 * (3.0 * square - 1.0), 0.5 * u * (5.0 * square - 3.0)
 
