@@ -79,7 +79,7 @@ def choose(choices: Choices) -> Chosen:
     suspected = _suspected(choices, chosen, level)
     hidden = () if fit.turned is None else candidates
     partly = tuple(n for n in hidden if any(_untestable(fit, fit.model.indices(n))))
-    together = _together(choices, effects, [n for n in suspected if n in untestable], level)
+    together = _together(choices, effects, suspected, level)
     return Chosen(effects, gains, rivals, untestable, suspected, partly, together)
 
 
@@ -178,12 +178,12 @@ def _no_chance(
 
 
 def _counted(choices: Choices, chosen: Sequence[str], name: str, gain: float) -> float:
-    """What of a fall of chi-square counts: what gusts may have turned explains nothing.
+    """What of a fall of chi-square counts: what regressors may be bent by explains nothing.
 
     So far from nominal its numbers must be then.
     """
     fit, places = choices.fit, choices.fit.model.indices(name)
-    if fit.turned is None:
+    if fit.turned is None and fit.answered is None:
         return gain
     at = choices.solved([*chosen, name])
     return min(gain, at.apart(places, _off(fit, places, at)))
