@@ -249,18 +249,21 @@ def _pruned(
 def _rivals(choices: Choices, chosen: Sequence[str], name: str) -> tuple[str, ...]:
     """Effects that are not taken in, and in its place would leave hardly more.
 
-    Also of those that this flight could not have shown: that nobody knows their numbers is no
-    reason why it should not be they.
+    Nor would what is there explain more beside them: else they explain something else.  Also of
+    those that this flight could not have shown: that nobody knows their numbers is no reason why it
+    should not be they.
     """
     whole = choices.solved(chosen).chi2
     rest = [c for c in chosen if c != name]
-    return tuple(
-        n
-        for n in choices.names
-        if n not in chosen
-        and _needs(n, rest)
-        and choices.solved([*rest, n]).chi2 - whole < AMBIGUOUS
-    )
+    out = []
+    for n in choices.names:
+        if n in chosen or not _needs(n, rest):
+            continue
+        instead = choices.solved([*rest, n]).chi2
+        both = choices.solved([*rest, n, name]).chi2
+        if instead - min(whole, both) < AMBIGUOUS:
+            out.append(n)
+    return tuple(out)
 
 
 def _testable(fit: Fit, name: str) -> bool:
