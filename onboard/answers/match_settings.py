@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from onboard.answers.flown import FlownRecording
 from onboard.answers.sensor_level import DRIVER_LAG_S, calibration_settings
+from onboard.core.vehicle.effects.rising_air import RISING
 from onboard.core.vehicle.effects.wind import FLOOR_M_S
 from onboard.core.vehicle.effects.wind_profile import TOP_M
 from onboard.core.vehicle.limits import APART
@@ -87,11 +88,20 @@ def _wind_settings(vehicle: VehicleMatch) -> list[Setting]:
         power = 0.5 if kind == 0.0 else 1.0
         gain = (TOP_M / min(max(wind.height, 0.5), TOP_M)) ** power
         speed, sigma = speed * gain, sigma * gain
-    return [
-        Setting("SIM_WIND_SPD", speed, sigma, "wind"),
+    out = [
         Setting("SIM_WIND_DIR", direction, turn, "wind, where it comes from"),
         Setting("SIM_WIND_T", kind, 0.0, "wind_profile" if kind != 1.0 else "wind, uniform"),
     ]
+    rising = vehicle.numbers.get(RISING)
+    if rising is not None and abs(rising.real) > rising.floor + APART * rising.sigma:
+        # The simulator turns the wind upwards: its speed is that along the slope.
+        slope = math.atan2(rising.real, speed)
+        across = math.hypot(rising.sigma * math.cos(slope), sigma * math.sin(slope))
+        sigma = math.hypot(sigma * math.cos(slope), rising.sigma * math.sin(slope))
+        speed = math.hypot(speed, rising.real)
+        turned = math.degrees(across / speed)
+        out.append(Setting("SIM_WIND_DIR_Z", math.degrees(slope), turned, "air that rises"))
+    return [Setting("SIM_WIND_SPD", speed, sigma, "wind"), *out]
 
 
 def _drag_settings(vehicle: VehicleMatch) -> list[Setting]:

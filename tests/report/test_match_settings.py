@@ -79,3 +79,19 @@ def test_the_simulators_accelerometer_errs_as_that_of_a_board_that_is_mounted_tu
     for f_b in np.random.default_rng(1).uniform(-20.0, 20.0, (5, 3)):
         raw_s = R_bs.T @ (f_b / err_scale + bias)
         assert R_bs @ ((raw_s - offset) * scale) == pytest.approx(f_b, abs=1e-9)
+
+
+def test_air_that_sinks_turns_the_simulators_wind_down():
+    vehicle = by_hand().vehicle
+    wind = replace(vehicle.wind, north=-3.0, east=4.0, change=0.0, profile_exponent=None)
+    rising = Compared(0.0, -2.5, 0.1, "m/s", 0.3)
+    numbers = {**vehicle.numbers, "rising": rising}
+    of_air = replace(vehicle, wind=wind, numbers=numbers)
+    told = {s.name: s for s in settings_of(of_air, (), of_air.effects, RECORDING)}
+    speed, up = told["SIM_WIND_SPD"].value, np.radians(told["SIM_WIND_DIR_Z"].value)
+    assert speed * np.sin(up) == pytest.approx(-2.5)
+    assert speed * np.cos(up) == pytest.approx(5.0)
+    # Nothing that is not surely more than matters.
+    calm = replace(of_air, numbers=numbers | {"rising": replace(rising, real=-0.5)})
+    names = {s.name for s in settings_of(calm, (), calm.effects, RECORDING)}
+    assert "SIM_WIND_DIR_Z" not in names

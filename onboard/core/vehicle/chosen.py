@@ -79,7 +79,7 @@ def choose(choices: Choices) -> Chosen:
     suspected = _suspected(choices, chosen, level)
     hidden = () if fit.turned is None else candidates
     partly = tuple(n for n in hidden if any(_untestable(fit, fit.model.indices(n))))
-    together = _together(choices, effects, [n for n in suspected if n in untestable], level)
+    together = _together(choices, effects, suspected, level)
     return Chosen(effects, gains, rivals, untestable, suspected, partly, together)
 
 
@@ -178,12 +178,12 @@ def _no_chance(
 
 
 def _counted(choices: Choices, chosen: Sequence[str], name: str, gain: float) -> float:
-    """What of a fall of chi-square counts: what gusts may have turned explains nothing.
+    """What of a fall of chi-square counts: what regressors may be bent by explains nothing.
 
     So far from nominal its numbers must be then.
     """
     fit, places = choices.fit, choices.fit.model.indices(name)
-    if fit.turned is None:
+    if fit.turned is None and fit.answered is None:
         return gain
     at = choices.solved([*chosen, name])
     return min(gain, at.apart(places, _off(fit, places, at)))
@@ -249,18 +249,21 @@ def _pruned(
 def _rivals(choices: Choices, chosen: Sequence[str], name: str) -> tuple[str, ...]:
     """Effects that are not taken in, and in its place would leave hardly more.
 
-    Also of those that this flight could not have shown: that nobody knows their numbers is no
-    reason why it should not be they.
+    Nor would what is there explain more beside them: else they explain something else.  Also of
+    those that this flight could not have shown: that nobody knows their numbers is no reason why it
+    should not be they.
     """
     whole = choices.solved(chosen).chi2
     rest = [c for c in chosen if c != name]
-    return tuple(
-        n
-        for n in choices.names
-        if n not in chosen
-        and _needs(n, rest)
-        and choices.solved([*rest, n]).chi2 - whole < AMBIGUOUS
-    )
+    out = []
+    for n in choices.names:
+        if n in chosen or not _needs(n, rest):
+            continue
+        instead = choices.solved([*rest, n]).chi2
+        both = choices.solved([*rest, n, name]).chi2
+        if instead - min(whole, both) < AMBIGUOUS:
+            out.append(n)
+    return tuple(out)
 
 
 def _testable(fit: Fit, name: str) -> bool:

@@ -23,6 +23,7 @@ from onboard.core.vehicle.effects.mass_change import Change, MassChange, ThrustC
 from onboard.core.vehicle.effects.motor_lag import MotorLag
 from onboard.core.vehicle.effects.own import own
 from onboard.core.vehicle.effects.own_motion import OwnMotion
+from onboard.core.vehicle.effects.rising_air import RISING, RisingAir
 from onboard.core.vehicle.effects.rotor_drag import RotorDrag
 from onboard.core.vehicle.effects.rotor_wind import RotorWind
 from onboard.core.vehicle.effects.sensor_offset import SensorOffset
@@ -202,6 +203,7 @@ def copter_model(
         own([Wind(sigma) for sigma in wind_sigmas(flight)]),
         *([WindChange(flight, moment=variant.wind_from)] if CHANGE in variant.beyond else []),
         own([WindProfile(variant.profile_top) for _ in parts]),
+        *([own([RisingAir() for _ in parts])] if RISING in variant.beyond else []),
         *([own([GustDrag(variant.gusts) for _ in parts])] if variant.gusts else []),
         *([AirDensity()] if flown_high(flight) else []),
         *([MassChange(change, flight)] if change else []),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.half_space import least_above
+from onboard.core.vehicle.answered import Answered
 from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.columns import Columns
 from onboard.core.vehicle.inflation import inflated, inflation_of
@@ -54,6 +55,7 @@ class Fit:
         considered: (m, l) what each error of the recorded motion adds to the scores.
         scale: one inflation for tests of several unknowns: that of the blocks' scores.
         turned: what gusts may have done to the unknowns; None where none are seen.
+        answered: what commands that answer a disturbance may have; None where there are none.
     """
 
     model: ForceModel
@@ -70,6 +72,7 @@ class Fit:
     considered: Array
     scale: float
     turned: Turned | None = None
+    answered: Answered | None = None
 
     @property
     def information(self) -> Array:
@@ -91,16 +94,17 @@ class Fit:
         return np.array([u.doubted(v, s) for u, v, s in pairs])
 
     def untold(self, information: Array, free: Sequence[int]) -> Array:
-        """(f, f) covariance that no data tell: of laws, and by what gusts may have turned.
+        """(f, f) covariance that no data tell: of laws, and by what regressors may be bent by.
 
         Args:
             information: (f, f) of the free ones, the prior in it.
             free: their places.
         """
-        laws: Array = np.diag(self.doubt[list(free)] ** 2)
-        if self.turned is None:
-            return laws
-        return laws + self.turned.covariance(information, free)
+        out: Array = np.diag(self.doubt[list(free)] ** 2)
+        for may_have in (self.turned, self.answered):
+            if may_have is not None:
+                out += may_have.covariance(information, free)
+        return out
 
 
 @dataclass(frozen=True, slots=True)

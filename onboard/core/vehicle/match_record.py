@@ -13,6 +13,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.physics.finding import NAN
 from onboard.core.physics.wording import listed
 from onboard.core.vehicle.bounds import above_sentence, below_sentence
+from onboard.core.vehicle.changed import undecided_sentence
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import beyond_of, beyond_sentence
 from onboard.core.vehicle.effects.motor_lag import DELAY, MotorLag
@@ -31,7 +32,12 @@ from onboard.core.vehicle.records import (
     VehicleMatch,
 )
 from onboard.core.vehicle.remainder import left_out_sentence, remainder_sentence
-from onboard.core.vehicle.wind_record import change_sentence, height_sentence, wind_of
+from onboard.core.vehicle.wind_record import (
+    change_sentence,
+    height_sentence,
+    rising_sentence,
+    wind_of,
+)
 
 PARTLY = "gusts hide a part of its numbers, and only the rest was tested"
 
@@ -228,9 +234,11 @@ def note_of(m: Matched) -> str:
         suspected_sentence(m.chosen.suspected, m.chosen.together),
         below_sentence(m.below),
         above_sentence(m.above),
+        undecided_sentence(m.fit, m.undecided),
         beyond_sentence(beyond_of(m.model.effects)),
         change_sentence(m),
         height_sentence(m),
+        rising_sentence(m),
         remainder_sentence(m.remainders, m.unexplained),
         left_out_sentence(m.left_out),
     )

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.maths.arrays import Array, Mask
+from onboard.core.vehicle.answer_errors import answered_by_commands
 from onboard.core.vehicle.bounds import above_bounds, at_bounds, below_bounds
+from onboard.core.vehicle.changed import undecided_of
 from onboard.core.vehicle.choices import Choices
 from onboard.core.vehicle.chosen import Chosen, choose
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
@@ -76,7 +78,12 @@ class Matched:
     @property
     def stand_ins(self) -> tuple[str, ...]:
         """Effects that stand for something else, and have no name for it."""
-        return (*self.below, *self.above)
+        return (*self.below, *self.above, *self.undecided)
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Effects that describe a change in flight which may be another one."""
+        return undecided_of(self.chosen.effects)
 
     @property
     def handed_back(self) -> tuple[str, ...]:
@@ -187,7 +194,8 @@ def _finished(first: Fit) -> _Finished:
     fit = fit if felt is None else felt.fit
     if felt is not None or (sensed and turbulence.seen):
         fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
-    return _Finished(plain, replace(fit, doubt=propeller_doubt(fit)), kept, turbulence)
+    fit = replace(fit, doubt=propeller_doubt(fit), answered=answered_by_commands(fit))
+    return _Finished(plain, fit, kept, turbulence)
 
 
 def described(fit: Fit) -> tuple[Fit, Mask]:

@@ -22,9 +22,11 @@ from onboard.core.vehicle.effects.beyond import Beyond, Law
 from onboard.core.vehicle.effects.beyond_rotors import COPTERS
 from onboard.core.vehicle.effects.effect import Effect
 from onboard.core.vehicle.effects.lift import Lift
+from onboard.core.vehicle.effects.rising_air import RISING, RisingAir
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import CHANGE, WindChange
 from onboard.core.vehicle.effects.wind_height import HEIGHT, WindByHeight
+from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import Fit, Slopes, slopes_at, summed
 from onboard.core.vehicle.gust_errors import rising
 from onboard.core.vehicle.inflation import inflation_of
@@ -55,7 +57,8 @@ def structures(
     Args:
         fit: of everything else.
         known: keys of what the model has already.
-        laws: that are asked for beside a wind that changes; a copter's are the default.
+        laws: that are asked for beside a wind that changes; a copter's, with air that rises, are
+            the default.
         answering: whether the vehicle answers gusts that the fit takes for its own motion: then
             a law must hold as well by what it was a second before, which a gust has not made, and
             one of what answers at once is not asked for.
@@ -66,7 +69,9 @@ def structures(
     if answering:
         every = {key: e for key, e in every.items() if not laws[key].answers}
     every[CHANGE] = WindChange(model.flight, name=ASKED)
-    if laws is not COPTERS:
+    if laws is COPTERS:
+        every[RISING] = RisingAir(name=ASKED)
+    else:
         every[HEIGHT] = WindByHeight(model.flight, name=ASKED)
     asked = {k: e for k, e in every.items() if k not in known and _acts(e, air)}
     slopes = slopes_at(model, fit.theta)
@@ -136,8 +141,9 @@ def _with(fit: Fit, slopes: Slopes, effect: Effect) -> Fit:
     """The sums with one more effect, which does nothing yet; ``slopes`` are those without it."""
     effects = list(fit.model.effects)
     at = len(effects)
-    if isinstance(effect, WindChange | WindByHeight):
-        at = 1 + next(k for k, e in enumerate(effects) if e.name == Wind.name)
+    if isinstance(effect, WindChange | WindByHeight | RisingAir):
+        before = (Wind.name, WindProfile.name) if isinstance(effect, RisingAir) else (Wind.name,)
+        at = 1 + max(k for k, e in enumerate(effects) if e.name in before)
     place = sum(len(e.unknowns) for e in effects[:at])
     effects.insert(at, effect)
     model = replace(fit.model, effects=tuple(effects))

@@ -8,9 +8,11 @@ import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.effects.own import Own
+from onboard.core.vehicle.effects.rising_air import RISING
 from onboard.core.vehicle.effects.wind_change import WindChange
 from onboard.core.vehicle.effects.wind_height import WindByHeight
 from onboard.core.vehicle.effects.wind_profile import WindProfile
+from onboard.core.vehicle.limits import APART
 from onboard.core.vehicle.matching import Matched
 from onboard.core.vehicle.noise import rms
 from onboard.core.vehicle.records import WindEstimate
@@ -51,6 +53,18 @@ def height_sentence(m: Matched) -> str:
         f"the wind is another one higher up: by {north:.1f} and {east:.1f} m/s towards north and "
         f"east in 100 m; that at the mean height is told, and no setting makes the rest"
     )
+
+
+def rising_sentence(m: Matched) -> str:
+    """What a person is told of air that surely rose or sank in the mean of the first flight."""
+    if RISING not in {u.name for u in m.model.unknowns}:
+        return ""
+    k = m.model.index(RISING)
+    up, sigma = float(m.fit.theta[k]), float(m.fit.sigma[k])
+    if abs(up) < m.model.unknowns[k].floor + APART * sigma:
+        return ""
+    rose = "rose" if up > 0.0 else "sank"
+    return f"the air {rose} by {abs(up):.1f} m/s in the mean of the flight"
 
 
 def wind_of(m: Matched, number: int = 0) -> WindEstimate:

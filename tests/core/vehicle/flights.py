@@ -75,13 +75,16 @@ def copter_flight(
     weaker=None,
     turning=(0.0, 0.0),
     front=None,
+    rougher=None,
+    rising=0.0,
 ):
     """A copter that manoeuvres: four motors that share the thrust, thrust by a known command.
 
     The motors follow what is asked of them behind a low-pass of ``lag``, s.  ``mass`` and
     ``weaker`` are (moment, factor): from so many seconds on it, or the thrust, is so many times
-    itself.  The wind becomes another by twice ``turning``, at an even rate, about its mean; or
-    at once, of a ``front`` (moment, by how much).
+    itself; so is the drag of a copter that gets ``rougher``.  The air is ``rising``, m/s.  The wind
+    becomes another by twice ``turning``, at an even rate, about its mean; or at once, of a
+    ``front`` (moment, by how much).
     """
     rng = np.random.default_rng(seed)
     n = int(seconds / STEP)
@@ -101,6 +104,7 @@ def copter_flight(
     w_n[:, :2] += np.linspace(-1.0, 1.0, n)[:, None] * np.asarray(turning)
     if front is not None:
         w_n[t - t[0] >= front[0], :2] += np.asarray(front[1])
+    w_n[:, 2] -= rising
     u = np.einsum("nji,nj->ni", R, v_n - w_n)
     rho = 1.225 * (1 - 0.0065 * height / 288.15) ** 4.2559
     command = 0.6 + size * np.clip(smooth(rng, n, 0.06), -0.2, 0.2)
@@ -108,13 +112,15 @@ def copter_flight(
     voltage = np.full(n, 12.6) if volts is None else np.linspace(*volts, n)
     rho_ref = 1.225 * (1 - 0.0065 * 593.0 / 288.15) ** 4.2559
     outflow = 2 * 29.3 * 12.09 / (3.0 * G)
-    heavy, strong = (
-        np.where(t - t[0] < of[0], 1.0, of[1]) if of else np.ones(n) for of in (mass, weaker)
+    heavy, strong, rough = (
+        np.where(t - t[0] < of[0], 1.0, of[1]) if of else np.ones(n)
+        for of in (mass, weaker, rougher)
     )
     thrust = ratio * G / 0.39 * rho / rho_ref * power * (voltage / 12.6) ** (2 * sag) * strong
     thrust = thrust - G / outflow**2 * rho / rho_ref * np.maximum(-u[:, 2], 0.0) ** 2
     linear = c_m * np.sqrt(rho / 1.225 * np.maximum(thrust, 0.5) / G)
     force = -linear[:, None] * u - 0.5 * (rho * area)[:, None] * np.abs(u) * u
+    force *= rough[:, None]
     force[:, 0] += tilt[0] * thrust
     force[:, 1] += tilt[1] * thrust
     force[:, 2] -= thrust

@@ -1,4 +1,4 @@
-"""What a part of a flight says against an effect that all of it shows."""
+"""What parts of a flight, and other effects, say against one that all of it shows."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from onboard.core.vehicle.block_sums import BlockSums
 from onboard.core.vehicle.choices import Choices
+from onboard.core.vehicle.chosen import _rivals
 from onboard.core.vehicle.effects.effect import Unknown
 
 BLOCKS, DRAWS = 10, 300
@@ -59,3 +60,22 @@ def test_what_two_blocks_alone_show_does_not_last():
     drawn = np.sqrt(BLOCKS) * rng.normal(size=(DRAWS, BLOCKS))
     drawn[:, 4:6] += (FLOOR + 4.0) * BLOCKS / 2.0
     assert np.mean([lasts(means) for means in drawn]) < 0.01
+
+
+def rivals(without, wind, curve, both):
+    """Rivals of a wind, by chi-square with neither, one or both of two effects."""
+    chi2 = {(): without, ("wind",): wind, ("curve",): curve, ("curve", "wind"): both}
+    choices = SimpleNamespace(
+        names=("wind", "curve"), solved=lambda of: SimpleNamespace(chi2=chi2[tuple(sorted(of))])
+    )
+    return _rivals(choices, ["wind"], "wind")
+
+
+def test_what_would_do_as_well_in_its_place_is_a_rival():
+    assert rivals(200.0, 100.0, 103.0, 99.0) == ("curve",)
+    assert rivals(200.0, 100.0, 150.0, 99.0) == ()
+
+
+def test_what_explains_something_else_is_none():
+    # It explains more than the wind, and leaves all that the wind explains.
+    assert rivals(300.0, 200.0, 100.0, 0.0) == ()

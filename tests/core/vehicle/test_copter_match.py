@@ -53,6 +53,17 @@ def test_a_wind_is_found_and_is_taken_for_nothing_else():
     assert match.alone_after < 0.2 * match.alone_before
 
 
+@pytest.mark.parametrize("rising", [2.5, -1.5])
+def test_air_that_rises_is_neither_a_propeller_nor_a_wind_across(rising):
+    match = matched(copter_flight(wind=(-2.2, 3.8), rising=rising, seed=6))
+    assert names(match) == {"wind"}
+    assert match.explained
+    within(match, "rising", rising)
+    within(match, "wind.north", -2.2)
+    within(match, "wind.east", 3.8)
+    assert f"the air {'rose' if rising > 0.0 else 'sank'} by {abs(rising)} m/s" in match.note
+
+
 def test_a_wind_that_grows_with_height_is_told_from_a_uniform_one():
     match = matched(copter_flight(wind=(4.0, -3.0), exponent=0.5, seed=3))
     assert names(match) == {"wind", "wind_profile"}

@@ -69,6 +69,16 @@ def test_thrust_that_gives_way_is_no_mass_for_the_drag_stays():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("rougher", "weaker"), [(1.5, 1.0), (1.3, 0.8)])
+def test_drag_that_changes_is_neither_a_mass_nor_a_thrust(rougher, weaker):
+    flight = copter_flight(rougher=(110.0, rougher), weaker=(110.0, weaker), wind=(3, 1), seed=5)
+    match = matched(flight)
+    assert not names(match) & {"mass_change", "thrust_change", "rotor_drag", "body_drag"}
+    assert not match.explained
+    assert f"at 110 s the thrust of one command became {weaker:.2f} times itself" in match.note
+
+
+@pytest.mark.slow
 def test_a_change_is_told_beside_what_else_differs():
     match = matched(copter_flight(mass=(130.0, 0.9), wind=(3.0, -2.0), expo=0.3, seed=4))
     assert names(match) == {"mass_change", "wind", "thrust_curve"}
