@@ -11,3 +11,9 @@ def world(tmp_path, request):
     w.eager = request.param == "eager"
     yield w
     w.journal.close()
+
+
+@pytest.fixture
+def path(tmp_path):
+    """Of a journal."""
+    return tmp_path / "state" / "journal.jsonl"

@@ -94,6 +94,7 @@ class Parts:
         company = Company(link, board, parameters)
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, calendar)
+        hindrance = Hindrance(link, parameters, traffic, has_key=signing is not None)
         link.presence.held = lambda: pusher.busy
         link.presence.committed = lambda: pusher.has_written or handover.has_learned
         return cls(
@@ -117,16 +118,7 @@ class Parts:
             diagnoses=Diagnoses(ledger.append, notices),
             handover=handover,
             vigilance=Vigilance(
-                link,
-                company,
-                observed,
-                signing,
-                handover.repetitions,
-                Hindrance(link, parameters, traffic, has_key=signing is not None),
-                handover.failures,
-                ledger,
-                lambda: handover.unsaved,
-                notices,
+                link, company, observed, signing, handover, hindrance, ledger, notices
             ),
         )
 

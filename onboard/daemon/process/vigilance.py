@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-from onboard.daemon.learning.failures import Failures
+from onboard.daemon.learning.handover import Handover
 from onboard.daemon.process import limits
 from onboard.daemon.process.company import Company
 from onboard.daemon.process.condition import Observed
@@ -13,7 +13,6 @@ from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.view.notices import Notices
 from onboard.mavlink.autopilot import AutopilotState
 from onboard.mavlink.link import Link
-from onboard.mavlink.repetitions import Repetitions
 from onboard.mavlink.signing import Signing
 
 UNSIGNED = (
@@ -34,11 +33,9 @@ class Vigilance:
         company: whether two autopilots answer to its name.
         observed: the vehicle's condition.
         signing: the key's bookkeeping, None without a key.
-        repetitions: samples with one time stamp and different content.
+        handover: of the samples to the learner, and whether it and the disk take them.
         hindrance: what keeps us from learning or writing.
-        failures: of the learner.
         ledger: what is written down.
-        unsaved: why what is learned is not kept, in a sentence; empty: it is.
         notices: where it is told.
     """
 
@@ -48,22 +45,18 @@ class Vigilance:
         company: Company,
         observed: Observed,
         signing: Signing | None,
-        repetitions: Repetitions,
+        handover: Handover,
         hindrance: Hindrance,
-        failures: Failures,
         ledger: Ledger,
-        unsaved: Callable[[], str],
         notices: Notices,
     ) -> None:
         self._link = link
         self._company = company
         self._observed = observed
         self._signing = signing
-        self._repetitions = repetitions
+        self._handover = handover
         self._hindrance = hindrance
-        self._failures = failures
         self._ledger = ledger
-        self._unsaved = unsaved
         self._notices = notices
         self._told: set[str] = set()
 
@@ -83,7 +76,7 @@ class Vigilance:
     @property
     def stopped(self) -> str:
         """Why nothing is learned before the next flight, in a sentence; else empty."""
-        return self._failures.stopped
+        return self._handover.failures.stopped
 
     @property
     def disk(self) -> str:
@@ -110,8 +103,8 @@ class Vigilance:
             yield STOPPED, self.stopped
         if self.disk:
             yield "no_journal", self.disk
-        if self._unsaved():
-            yield "not_saved", self._unsaved()
+        if self._handover.unsaved:
+            yield "not_saved", self._handover.unsaved
         yield from self._hindered(now)
         rivals = self._link.presence.rivals(now)
         if rivals:
@@ -135,7 +128,7 @@ class Vigilance:
                 "twin",
                 "another onboard service serves this vehicle; the one that came later yields",
             )
-        if self._repetitions.doubtful(now):
+        if self._handover.repetitions.doubtful(now):
             yield (
                 "samples_contradict",
                 "samples with one time stamp say different things: both are dropped",
