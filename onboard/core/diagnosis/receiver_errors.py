@@ -86,7 +86,7 @@ class Looking:
             # The attitude is that of a flight without errors until they are known.
             found = self._chosen([x.tile for x in seen], np.array([x.off for x in seen]))
             left = self._left(found)
-        return tuple(self._told(x) for x in found if self._lasts(x, left))
+        return tuple(self._told(x, left) for x in found if self._lasts(x, left))
 
     def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
         """When velocities jump, s: a tile for each fix about some moments, the flight between."""
@@ -130,14 +130,17 @@ class Looking:
     def _lasts(self, found: Stretch, left: _Left) -> bool:
         """Whether an error is one of many fixes, and no chance where the receiver is noisy.
 
-        A fix that is off by itself is what gates are for.  A jump without a partner is no more than
-        that, if what crept in before it explains nothing beyond: a receiver has lost a satellite.
+        Nor by its size alone, as if noise could last as long as it likes: multipath may.  A fix
+        that is off by itself is what gates are for.  A jump without a partner is no more than that,
+        if what crept in before it explains nothing beyond: a receiver has lost a satellite.
         """
         fixes = len(self._false(found.tile))
-        sigma = float(np.hypot(self._noise.velocity, self._noise.velocity_colour))
+        variance = self._noise.velocity**2 + self._noise.velocity_colour**2
+        if float(found.off @ found.off) < needed(D, len(self._fixes)) * variance:
+            return False
         # What twice the log-likelihood falls by if a velocity may be anything.
-        refused = ANYTHING["vvv"] - D * (2.0 * log(sigma) + 1.0)
-        enough = max(left.variance(found.tile), 1.0) * self._chance
+        refused = ANYTHING["vvv"] - D * (log(variance) + 1.0)
+        enough = left.variance(found.tile, GATE_VELOCITY) * self._chance
         enough += refused if found.tile.crept else 0.0
         return fixes > 1 and min(found.gain, fixes * refused) > enough
 
@@ -146,9 +149,11 @@ class Looking:
         inside: Array = self._fixes[(self._fixes >= tile.begin) & (self._fixes < tile.end)]
         return inside
 
-    def _told(self, found: Stretch) -> ReceiverError:
+    def _told(self, found: Stretch, left: _Left) -> ReceiverError:
+        """From its first fix to its last, as well known as the receiver is noisy there."""
         false = self._false(found.tile)
-        return ReceiverError(float(false[0]), float(false[-1]), found.off, found.sigma)
+        sigma = found.sigma * float(np.sqrt(left.variance(found.tile)))
+        return ReceiverError(float(false[0]), float(false[-1]), found.off, sigma)
 
     def _left(self, known: Sequence[Stretch]) -> _Left:
         """What each velocity is off by beside what was measured before, known errors taken out."""
@@ -193,11 +198,16 @@ class _Left:
         out: list[float] = self.t[worst[score[worst] > -2.0 * log(SEARCHED)]].tolist()
         return out
 
-    def variance(self, tile: Tile) -> float:
-        """Of velocities in a tile and near it, over what is expected; gates refuse what is more."""
+    def variance(self, tile: Tile, most: float = np.inf) -> float:
+        """Of velocities in a tile and near it over what is expected, at least 1.
+
+        Args:
+            tile: from when to when.
+            most: of the chi-square of one, the rest of which is left out.
+        """
         near = (self.t > tile.begin - NEAR_S) & (self.t < tile.end + NEAR_S)
-        chi2 = np.minimum(self.chi2[near], GATE_VELOCITY)
-        return float(chi2.sum() / max(self.freedom[near].sum(), 1.0))
+        chi2 = np.minimum(self.chi2[near], most)
+        return max(float(chi2.sum() / max(self.freedom[near].sum(), 1.0)), 1.0)
 
 
 def _sum_at(t: Array, known: Sequence[Stretch]) -> Array:
