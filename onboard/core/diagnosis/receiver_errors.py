@@ -105,16 +105,16 @@ class Looking:
 
     def _between(self, jumps: Sequence[float]) -> tuple[Stretch, ...]:
         """Errors that begin and end where velocities jump, s; the others crept in until then."""
-        first, last = self._fixes[0] + CONTACT_S, self._fixes[-1] - CONTACT_S
         # While the ground may be touched, it may be a shock that a velocity jumps by.
-        inside = [t for t in jumps if first < t < last]
-        closed = self._chosen([Tile(a, b) for a, b in pairwise(inside)])
+        first, last = self._fixes[0] + CONTACT_S, self._fixes[-1] - CONTACT_S
+        aloft = {t for t in jumps if first < t < last}
+        closed = self._chosen([Tile(a, b) for a, b in pairwise(jumps) if a in aloft or b in aloft])
         ends = {t for x in closed for t in (x.tile.begin, x.tile.end)}
         crept = [
             Tile(t - span, t, crept=True)
-            for t in inside
+            for t in sorted(aloft - ends)
             for span in CREEPS_S
-            if t not in ends and not any(t - span < u < t for u in (self._fixes[0], *jumps))
+            if not any(t - span < u < t for u in (self._fixes[0], *jumps))
         ]
         return self._chosen([*(x.tile for x in closed), *crept]) if crept else closed
 
