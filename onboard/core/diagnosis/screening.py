@@ -23,6 +23,7 @@ from onboard.core.diagnosis.score import surprise
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import DELAY_RANGE_S
+from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.traces import residual
 from onboard.core.gps.distrust import Distrust
@@ -140,7 +141,7 @@ def _of_most(full: Examination) -> tuple[NoiseLevels, bool]:
     if not seen.any():
         return noise, False
     off = residual(traces.innovation, traces.columns, full.found().theta)[seen, :2]
-    usual = 1.4826 * float(np.median(np.abs(off)))
+    usual = max(1.4826 * float(np.median(np.abs(off))), LIMITS["velocity"][0])
     largest, floor = float(np.max(np.sum(off**2, axis=1))), NoiseLevels()
     levels = replace(
         noise,
