@@ -318,15 +318,15 @@ async def test_a_fault_of_ours_in_a_push_ends_the_service_and_the_next_start_und
         sound = getattr(service.parts.pusher, where)
 
         def broken(*args, **kwargs):
-            if len(vehicle.sets) == 3:
+            if len(vehicle.sets) >= 3:
                 raise ArithmeticError(where)
             return sound(*args, **kwargs)
 
         setattr(service.parts.pusher, where, broken)
         task = asyncio.create_task(service.run())
         with pytest.raises((ArithmeticError, BaseExceptionGroup)):
-            await task
-        assert len(vehicle.sets) == 3
+            await asyncio.wait_for(task, 600.0)
+        assert 3 <= len(vehicle.sets) < 6
         assert in_force(vehicle) != pytest.approx(before)
         async with daemon(document) as again:
             await until(lambda: not again.parts.journal.recover())
