@@ -18,7 +18,13 @@ from math import log
 
 import numpy as np
 
-from onboard.core.diagnosis.effort import CREEPS_S, FURTHEST, MOST_EDGES, SEARCHED
+from onboard.core.diagnosis.effort import (
+    CREEPS_S,
+    FORGOTTEN_S,
+    FURTHEST,
+    MOST_EDGES,
+    SEARCHED,
+)
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_stretches import Stretch, Stretches, VelocityJumps
 from onboard.core.diagnosis.limits import CONTACT_S, NEAR_S
@@ -104,19 +110,27 @@ class Looking:
         return found
 
     def _between(self, jumps: Sequence[float]) -> tuple[Stretch, ...]:
-        """Errors that begin and end where velocities jump, s; the others crept in until then."""
+        """Errors that begin and end where velocities jump, s.
+
+        Where a jump has no partner, one crept in until then, or is there when the flight begins or
+        ends, if that is near enough to be remembered.
+        """
         # While the ground may be touched, it may be a shock that a velocity jumps by.
         first, last = self._fixes[0] + CONTACT_S, self._fixes[-1] - CONTACT_S
         aloft = {t for t in jumps if first < t < last}
         closed = self._chosen([Tile(a, b) for a, b in pairwise(jumps) if a in aloft or b in aloft])
         ends = {t for x in closed for t in (x.tile.begin, x.tile.end)}
-        crept = [
+        begins, stops = float(self._fixes[0]) - 1.0, float(self._fixes[-1]) + 1.0
+        alone = sorted(aloft - ends)
+        others = [
             Tile(t - span, t, crept=True)
-            for t in sorted(aloft - ends)
+            for t in alone
             for span in CREEPS_S
-            if not any(t - span < u < t for u in (self._fixes[0], *jumps))
+            if not any(t - span < u < t for u in (begins, *jumps))
         ]
-        return self._chosen([*(x.tile for x in closed), *crept]) if crept else closed
+        others += [Tile(t, stops) for t in alone if max(jumps) == t > stops - FORGOTTEN_S]
+        others += [Tile(begins, t) for t in alone if min(jumps) == t < begins + FORGOTTEN_S]
+        return self._chosen([*(x.tile for x in closed), *others]) if others else closed
 
     def _chosen(self, tiles: Sequence[Tile], about: Array | None = None) -> tuple[Stretch, ...]:
         """Those that there are, of errors that there may be, of sizes (n, 3) that they seem."""
@@ -132,7 +146,7 @@ class Looking:
 
         Nor by its size alone, as if noise could last as long as it likes: multipath may.  A fix
         that is off by itself is what gates are for.  A jump without a partner is no more than that,
-        if what crept in before it explains nothing beyond: a receiver has lost a satellite.
+        if nothing is explained beyond it: a receiver has lost a satellite.
         """
         fixes = len(self._false(found.tile))
         variance = self._noise.velocity**2 + self._noise.velocity_colour**2
@@ -141,7 +155,8 @@ class Looking:
         # What twice the log-likelihood falls by if a velocity may be anything.
         refused = ANYTHING["vvv"] - D * (log(variance) + 1.0)
         enough = left.variance(found.tile, GATE_VELOCITY) * self._chance
-        enough += refused if found.tile.crept else 0.0
+        within = self._fixes[0] < found.tile.begin and found.tile.end < self._fixes[-1]
+        enough += 0.0 if within and not found.tile.crept else refused
         return fixes > 1 and min(found.gain, fixes * refused) > enough
 
     def _false(self, tile: Tile) -> Array:
