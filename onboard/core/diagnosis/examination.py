@@ -169,21 +169,9 @@ class Examination(Engine):
             held, blind = None, False
         return self
 
-    def beside(
-        self,
-        more: Sequence[Family],
-        refused: Refused | None = None,
-        batches: Sequence[Batch] | None = None,
-    ) -> Examination:
-        """The same flight and columns with more of them, from where this one has come to.
-
-        Args:
-            more: columns.
-            refused: velocities that are not to be used; None: what the gates refuse.
-            batches: the flight with other fixes believed; None: as here.
-        """
-        t0, families = self.point.skew_from, (*self.families, *more)
-        return Examination(self, families, t0=t0, start=self, refused=refused, batches=batches)
+    def beside(self, more: Sequence[Family]) -> Examination:
+        """The same flight and columns with more of them, from where this one has come to."""
+        return Examination(self, (*self.families, *more), t0=self.point.skew_from, start=self)
 
     def carrying(self, nuisance: Family, *, tuned: bool = True) -> Examination:
         """The same flight and columns with a nuisance that whatever follows has to live with.

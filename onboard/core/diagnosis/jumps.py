@@ -191,11 +191,6 @@ def explains(full: Examination, chosen: Sequence[Effect], shock: Shock) -> bool:
     return surprise(gain, len(shock.unknowns), full.trusted_s / SPACINGS_S[-1]) >= least()
 
 
-def reach_of_blocks(full: Examination) -> float:
-    """s: at the start of a block, a jump shows that is anywhere in those beside it."""
-    return 1.5 * float(np.median([b.end - b.start for b in full.blocks]))
-
-
 def _best(
     full: Examination,
     chosen: Sequence[Effect],

@@ -30,7 +30,6 @@ from onboard.core.filter.kernel import (
     chosen,
     covariances,
     diagonal,
-    innovations,
 )
 from onboard.core.filter.limits import (
     ANEW,
@@ -321,32 +320,6 @@ class WhiteningFilter:
         y = made.W[:, :, 0] - made.W[:, :, 1 : self._m1] @ theta
         out: Array = np.minimum(made.log_var.sum(axis=1) + (y * y).sum(axis=1), ANYTHING[kinds])
         return out
-
-    def expected_velocity(
-        self, epoch: Epoch, theta: Array, uncertainty: Uncertainty
-    ) -> tuple[Array, Array] | None:
-        """Compare an epoch's velocity with dead reckoning, without taking it.
-
-        Args:
-            epoch: the measurement, to be believed or not.
-            theta: (m,) current estimate.
-            uncertainty: how well it is known.
-
-        Returns:
-            Innovation (v,), NED, m/s, and its covariance (v, v), all uncertainty included; None
-            where the epoch has no velocity.
-        """
-        kinds = kinds_of(epoch, velocity=True, height=False, attitude=False)
-        if not kinds:
-            return None
-        read = reading(kinds)
-        both = innovations(self.carried[:1], self._measured(epoch, theta), read)[0]
-        E, PH = both[:, : self._m1], both[:, self._m1 :]
-        white = self.variances.of_reading(epoch.noise, epoch.moving, epoch.stated)
-        noise = np.diag(white[0, read.first])
-        S = noise - PH[:, read.first] - PH[:, read.second]
-        D = E[:, 1:]
-        return E[:, 0] - D @ theta, S + uncertainty.along(D)
 
     def _measured(self, epoch: Epoch, theta: Array) -> Array:
         turned = _NOT_TURNED
