@@ -72,6 +72,7 @@ def bound(path: Path, levels: NoiseLevels = LEVELS) -> Array:
             F[V] += lean @ (eye[PSI] + 0.5 * turn)
             F[V, SCALE], F[V, BETA] = push[:, :3], push[:, 3:]
             F[H] -= step * 0.5 * (F[2] + eye[2])
+            Q[V, V] = (R * levels.walk_b) @ R.T * step
             P = F @ P @ F.T + Q
         P = (P + P.T) / 2
     return np.sqrt(np.diag(P)[17:23])
@@ -89,12 +90,12 @@ def _start(q: NoiseLevels) -> Array:
 
 
 def _walks(q: NoiseLevels, step: float) -> tuple[Array, Array]:
-    """Noise added in a step, and what is kept of states 10 to 16."""
+    """Noise added in a step but for the velocity's, and what is kept of states 10 to 16."""
     keep = np.ones(7)
     keep[:2] = np.exp(-step / ATTITUDE_TIME_S)
     keep[4:] = np.exp(-step / COLOUR_TIME_S)
     var = np.zeros(SIZE)
-    var[V], var[PSI] = q.force_walk**2 * step, q.tilt_walk**2 * step
+    var[PSI] = q.tilt_walk**2 * step
     var[BIAS], var[WANDER] = q.bias_walk**2 * step, q.height_walk**2 * step
     var[ATT] = q.attitude**2 * (1.0 - keep[:3] ** 2)
     var[ATT.stop - 1] = q.heading_walk**2 * step

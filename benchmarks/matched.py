@@ -38,6 +38,7 @@ LEVELS = NoiseLevels(
     height=0.3,
     height_walk=0.08,
     force_walk=0.03,
+    lift_walk=0.03,
     tilt_walk=4e-4,
     bias_walk=4e-5,
     attitude=0.03,
@@ -181,7 +182,7 @@ def _inertial(
 ) -> Timed:
     t = path.t[path.imu]
     n, step = len(t), 1.0 / IMU_HZ
-    f_b = path.f_b[path.imu] + rng.standard_normal((n, 3)) * q.force_walk / np.sqrt(step)
+    f_b = path.f_b[path.imu] + rng.standard_normal((n, 3)) * np.sqrt(q.walk_b / step)
     raw = f_b / scale + offset
     late = GYRO_DELAY * rng.standard_normal()
     w_b = np.stack([np.interp(t - late, path.t, path.w_b[:, j]) for j in range(3)], axis=-1)

@@ -25,6 +25,7 @@ SHORT = {
     "height": "hgt",
     "height_walk": "hwk",
     "force_walk": "fwk",
+    "lift_walk": "lwk",
     "tilt_walk": "gyro",
     "bias_walk": "bias",
     "attitude": "att",

@@ -1,5 +1,7 @@
 """On a flight that is as the model says, claimed sigmas are those of the Cramer-Rao bound."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,8 +53,26 @@ def test_claims_are_what_physics_allows(flown, whole):
 
 
 @pytest.mark.slow
+def test_claims_know_on_which_axis_the_force_is_shaken():
+    """One level for all made z, which lift shakes, attenuated, and x and y the other way round."""
+    shaken = replace(LEVELS, lift_walk=0.3)
+    flown = path("plane", duration=160.0)
+    limit, calm = bound(flown, shaken), bound(flown)
+    assert np.all(limit[[0, 1, 3, 4]] < 1.5 * calm[[0, 1, 3, 4]])
+    off = []
+    for seed in range(3, 7):
+        flight = draw(flown, seed, shaken)
+        c = fed(flight.samples).calibration(1)
+        off.append(error_of(c, flight) / c.sigma_with_its_gyroscope)
+        assert np.all(c.sigma_with_its_gyroscope[:2] < 1.5 * limit[:2] * flight.truth[1][:2])
+    # Of all flights the mean of each number, in sigmas of it.
+    assert np.all(np.abs(np.sum(off, axis=0)) / np.sqrt(len(off)) < 4.0), off
+
+
+@pytest.mark.slow
 def test_more_noise_or_less_flight_never_sharpens_the_bound(planned, flown, whole):
     vehicle, duration = planned
     assert np.all(bound(flown, LEVELS.scaled("velocity", 2.0)) > whole)
-    assert np.all(bound(flown, LEVELS.scaled("force_walk", 2.0)) > whole)
+    for axes in ("force_walk", "lift_walk"):
+        assert np.all(bound(flown, LEVELS.scaled(axes, 2.0)) > whole)
     assert np.all(bound(path(vehicle, duration=0.625 * duration)) > whole)

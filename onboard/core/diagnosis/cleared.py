@@ -147,7 +147,7 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
     That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
     that smooths: a span or an antenna may have been found for the sake of these very samples.
     """
-    if spikes.walk**2 < WALK_SHARE * full.noise.force_walk**2:
+    if spikes.walk**2 < WALK_SHARE * np.max(full.noise.walk_b):
         return False
     plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
     told = []
@@ -226,7 +226,8 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
     if little and not drowned(batches, density):
         return sampled
-    noise = np.minimum(white(density), sampled.noise.force_walk**2)
+    walk = (batches[0].segment.R_bs ** 2).T @ sampled.noise.walk_b
+    noise = np.minimum(white(density), walk)
     felt = asked.examined(expected(batches, density, noise), sampled)
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 

@@ -27,6 +27,7 @@ WORDS: Final = {
     "height_walk": GPS,
     "jitter": GPS,
     "force_walk": FORCE,
+    "lift_walk": FORCE,
     "tilt_walk": GYROSCOPE,
     "bias_walk": GYROSCOPE,
     "attitude": TILT,

@@ -112,7 +112,8 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
     )
     if not blocks:
         raise StateError("saved state is damaged: an accelerometer without sums")
-    noise = NoiseLevels(**{k: _finite(v) for k, v in e["noise"].items()})
+    levels = {"lift_walk": e["noise"]["force_walk"], **e["noise"]}  # one for all axes, once
+    noise = NoiseLevels(**{k: _finite(v) for k, v in levels.items()})
     for name, level in asdict(noise).items():
         # Nothing goes with what a receiver states that tells nothing.
         if level < 0.0 or (level == 0.0 and name not in STATED):

@@ -51,7 +51,8 @@ class Process(NamedTuple):
         decay: (B, MEASURED) factors that the slow errors decay by.
         swing: (B, 3) what the rate of the heading's error adds to it, what that error leaves of the
             rate, and what the rate leaves of itself.
-        before: (B, STATES) process noise before the transition, unit of the state squared.
+        before: (B, STATES) process noise before the transition, unit of the state squared; the
+            velocity's along body axes.
         after: (B, STATES) the same after it.
     """
 
@@ -162,7 +163,8 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     F = transition(R_nb, step)
     P = covariances(carried, m1)
     var = diagonal(carried, m1)
-    var += process.before
+    var[:, H:] += process.before[:, H:]
+    P[:, 0, V, V] += along_axes(R_nb, process.before[:, V])
     carried[:, :MEASURED] = F @ carried[:, :ERRORS]
     added, back, kept = process.swing.T[:, :, None]
     rate = back * carried[:, HEADING] + kept * carried[:, RATE]
@@ -175,14 +177,20 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
     P[..., ERRORS:RATE] *= process.decay[:, None, None]
     P[..., HEADING] += added * P[..., RATE]
     P[..., RATE] = rate
-    var += process.after
+    var[:, H:] += process.after[:, H:]
+    P[:, 0, V, V] += along_axes(R_nb, process.after[:, V])
     carried[:, :MEASURED, :m1] += stack_to_ned(R_nb, step.columns)
     carried[:, :MEASURED, 0] += process.fall
     if step.missed.any():
-        P[:, 0, V, V] += (R_nb * step.missed[:3]) @ R_nb.T
-        P[:, 0, PSI, PSI] += (R_nb * step.missed[3:]) @ R_nb.T
+        P[:, 0, V, V] += along_axes(R_nb, step.missed[:3])
+        P[:, 0, PSI, PSI] += along_axes(R_nb, step.missed[3:])
     if P.shape[1] > 1:
         P[:, 1:, :3, :3] += step.duration * R_nb.T[:, :, None] * R_nb.T[:, None, :]
+
+
+def along_axes(R_nb: Array, var: Array) -> Array:
+    """Covariances (..., 3, 3) in NED of what has variances (..., 3) along body axes."""
+    return (R_nb * var[..., None, :]) @ R_nb.T
 
 
 def innovations(carried: Array, z: Array, reading: Reading) -> Array:

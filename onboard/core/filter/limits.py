@@ -111,6 +111,7 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "height": (0.01, 10.0),
     "height_walk": (0.002, 2.0),
     "force_walk": (0.01, 3.0),
+    "lift_walk": (0.01, 3.0),
     "tilt_walk": (5e-5, 0.03),
     "bias_walk": (1e-6, 3e-3),
     "attitude": (0.02, 0.3),

@@ -167,13 +167,15 @@ def predict(
         driven[i, 0] += fall[i]
     for b in range(members):
         C = carried[b]
-        for i in range(STATES):
+        _spread(R_nb, before[b], 0, C[0:3, m1 : m1 + 3])
+        for i in range(3, STATES):
             C[i, m1 + i] += before[b, i]
         _from_the_left(F, C)
         _slow(decay[b], swing[b], C)
         for at in range(m1, m1 + count * STATES, STATES):
             _from_the_right(F, decay[b], swing[b], C, at)
-        for i in range(STATES):
+        _spread(R_nb, after[b], 0, C[0:3, m1 : m1 + 3])
+        for i in range(3, STATES):
             C[i, m1 + i] += after[b, i]
         _spread(R_nb, missed, 0, C[0:3, m1 : m1 + 3])
         _spread(R_nb, missed, 3, C[4:7, m1 + 4 : m1 + 7])

@@ -31,8 +31,10 @@ class NoiseLevels:
         vertical: how many times as large both are for the velocity down: satellites are above.
         height: white noise of GPS height, m.
         height_walk: wander of GPS height, m/sqrt(s).
-        force_walk: velocity random walk from accelerometer noise and all that is like it,
-            m/s/sqrt(s).
+        force_walk: velocity random walk from accelerometer noise and all that is like it, along
+            the body's x and y, m/s/sqrt(s).
+        lift_walk: the same along its z.  Lift and thrust act along it: of what they are shaken by,
+            turbulence and rotors, samples miss some.
         tilt_walk: angle random walk of the gyroscope, rad/sqrt(s).
         bias_walk: random walk of the gyroscope's bias, rad/s/sqrt(s).
         attitude: Gauss-Markov error of the recorded tilt (correlation time
@@ -56,6 +58,7 @@ class NoiseLevels:
     height: float = 0.2
     height_walk: float = 0.05
     force_walk: float = 0.04
+    lift_walk: float = 0.04
     tilt_walk: float = 3e-4
     bias_walk: float = 3e-5
     attitude: float = 0.02
@@ -72,6 +75,11 @@ class NoiseLevels:
         """One level times ``factor``, inside its limits."""
         low, high = LIMITS[name]
         return replace(self, **{name: float(np.clip(getattr(self, name) * factor, low, high))})
+
+    @property
+    def walk_b(self) -> Array:
+        """(3,) variance by which the velocity walks along body axes, (m/s)^2/s."""
+        return np.array([self.force_walk, self.force_walk, self.lift_walk]) ** 2
 
     @property
     def as_seen(self) -> NoiseLevels:
@@ -129,6 +137,7 @@ ESTIMATED = (
     "height",
     "height_walk",
     "force_walk",
+    "lift_walk",
     "tilt_walk",
     "bias_walk",
     "attitude",

@@ -35,7 +35,8 @@ class Variances:
     """Variances of the B members of a filter bank.
 
     Attributes:
-        walk: (B, STATES) of the random walks, unit of the state squared per s.
+        walk: (B, STATES) of the random walks, unit of the state squared per s; the velocity's, as
+            of a force, along body axes.
         settled: (B, MEASURED) of the slow errors, Gauss-Markov, of each measured number; its unit
             squared.
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
@@ -58,7 +59,7 @@ class Variances:
         self.heading_time = np.array([q.heading_time for q in bank])
         self.stated = np.array([(q.stated, q.stated_colour) for q in bank])
         for i, q in enumerate(bank):
-            self.walk[i, V] = q.force_walk**2
+            self.walk[i, V] = q.walk_b
             self.walk[i, CH] = q.height_walk**2
             velocity = np.array([1.0, 1.0, q.vertical**2])
             self.settled[i, V] = q.velocity_colour**2 * velocity
@@ -145,7 +146,7 @@ class Variances:
             stated: as in :class:`~onboard.core.filter.innovations.Step`.
 
         Returns:
-            Two arrays (B, STATES), unit of the state squared.
+            Two arrays (B, STATES), unit of the state squared; the velocity's along body axes.
         """
         before = self.walk * (0.5 * duration)
         after = before.copy()

@@ -69,8 +69,7 @@ def test_the_velocity_says_what_is_noise(flight):
     # Of real shaking no more can go than the walk that is found of the velocity leaves room for:
     # where that is a tie, its density over that of the samples.
     made = shaken(flight, real=SHAKE)
-    walk = fed(made, Calibrator()).engine(1).noise.force_walk
-    room = walk**2 / (SHAKE**2 * STEP)
+    room = fed(made, Calibrator()).engine(1).noise.walk_b / (SHAKE**2 * STEP)
     assert np.all(changed(made) <= 1.1 * room * SHAKE)
     assert np.all(room < 0.1)
 

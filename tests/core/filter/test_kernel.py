@@ -90,7 +90,13 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
     F[:, range(ERRORS, RATE), range(ERRORS, RATE)] = process.decay
     F[:, HEADING, RATE], F[:, RATE, HEADING], F[:, RATE, RATE] = process.swing.T
     X, P = parts(before, m)
-    first, then = (np.stack([np.diag(q) for q in x]) for x in (process.before, process.after))
+    # What a force does to the velocity is along body axes.
+    to_ned = np.eye(STATES)
+    to_ned[:3, :3] = R
+    first, then = (
+        np.stack([to_ned @ np.diag(q) @ to_ned.T for q in x])
+        for x in (process.before, process.after)
+    )
     grown = np.zeros_like(P)
     if bank[1]:
         for axis in range(3):

@@ -134,7 +134,12 @@ def test_what_a_fit_leaves_is_chi_square():
         Linearisation(delay=0.0),
         (
             NoiseLevels(
-                velocity=noise, velocity_colour=1e-6, force_walk=1e-6, tilt_walk=1e-9, jitter=1e-9
+                velocity=noise,
+                velocity_colour=1e-6,
+                force_walk=1e-6,
+                lift_walk=1e-6,
+                tilt_walk=1e-9,
+                jitter=1e-9,
             ),
         ),
         uses=PAPER,
@@ -155,6 +160,7 @@ LEVELS = NoiseLevels(
     height=0.3,
     height_walk=0.1,
     force_walk=0.05,
+    lift_walk=0.12,
     tilt_walk=1e-3,
     bias_walk=1e-4,
     attitude=0.01,
@@ -233,7 +239,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             v = v + a * DT
             R = R @ rotation_from_vector(w * DT)
             w_read = w + bias + levels.tilt_walk * normal(size=3) / np.sqrt(DT)
-            f_read = f + levels.force_walk * normal(size=3) / np.sqrt(DT)
+            f_read = f + np.sqrt(levels.walk_b / DT) * normal(size=3)
             middle = P @ rotation_from_vector(w_read * DT / 2)
             force, mean = force + middle @ f_read * DT, mean + middle * DT
             to_end = to_end + (T - (i + 0.5) * DT) * (middle @ f_read) * DT
@@ -294,7 +300,8 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     """``chi^2 + log det`` of the right levels is the lowest of its neighbours'."""
     rng = np.random.default_rng(1)
     n = 300
-    v = np.cumsum(0.1 * np.sqrt(0.2) * rng.normal(size=(n, 3)), axis=0)
+    walks = np.array([0.1, 0.1, 0.2])
+    v = np.cumsum(walks * np.sqrt(0.2) * rng.normal(size=(n, 3)), axis=0)
     reads = v + 0.1 * rng.normal(size=(n, 3))
     t = np.arange(0.0, 61.0, 0.02)
     still = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (len(t), 1))
@@ -302,8 +309,16 @@ def test_the_likelihood_prefers_the_levels_that_made_the_data():
     segment = Segment(t, np.zeros((len(t), 3)), still, t, R, np.eye(3))
     fixes = Fixes(0.5 + 0.2 * np.arange(n), reads, np.zeros(n), np.zeros(n))
     bank = tuple(
-        replace(quiet(velocity), force_walk=walk)
-        for velocity, walk in ((0.1, 0.1), (0.05, 0.1), (0.2, 0.1), (0.1, 0.05), (0.1, 0.2))
+        replace(quiet(velocity), force_walk=walk, lift_walk=lift)
+        for velocity, walk, lift in (
+            (0.1, 0.1, 0.2),
+            (0.05, 0.1, 0.2),
+            (0.2, 0.1, 0.2),
+            (0.1, 0.05, 0.2),
+            (0.1, 0.2, 0.2),
+            (0.1, 0.1, 0.1),
+            (0.1, 0.1, 0.4),
+        )
     )
     made = Pass(
         Model([Six(scale_sigma=1e-6, beta_sigma=1e-6)]), Linearisation(delay=0.0), bank, uses=PAPER
