@@ -23,12 +23,12 @@ SHAKE, NOTHING = np.full(3, 0.6), np.zeros(3)
 
 
 def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING):
-    """The flight with noise in its samples, and really shaken so that its velocity has it, too.
+    """The flight with noise in its samples, and really shaken so that its receiver has it, too.
 
     Beside both tones of 1.7 Hz: a beat in the samples, and a swing that is real.
     """
     rng, R_nb, v, made = np.random.default_rng(3), np.eye(3), np.zeros(3), []
-    times, speeds = [-np.inf], [v]
+    times, speeds, heights = [-np.inf], [v], [0.0]
     for s in samples:
         out = s
         if isinstance(s, AttitudeSample):
@@ -41,10 +41,13 @@ def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING)
             v = v + STEP * (R_nb @ a)
             times.append(s.t)
             speeds.append(v)
+            heights.append(heights[-1] - STEP * v[2])
         elif isinstance(s, GpsFix):
-            gained = speeds[int(np.searchsorted(times, s.t - LATE, side="right")) - 1]
+            at = int(np.searchsorted(times, s.t - LATE, side="right")) - 1
+            gained = speeds[at]
             down = None if s.v_d is None else s.v_d + gained[2]
-            out = replace(s, v_n=s.v_n + gained[0], v_e=s.v_e + gained[1], v_d=down)
+            north, east, up = s.v_n + gained[0], s.v_e + gained[1], s.altitude + heights[at]
+            out = replace(s, v_n=north, v_e=east, v_d=down, altitude=up)
         made.append(out)
     return made
 
