@@ -77,24 +77,34 @@ def scoring_step(
     slope = rise / apart + np.diag(H) * apart / 2.0
     low, high = np.clip(np.log(limits / here[:, None]), -LONGEST_STEP, LONGEST_STEP).T
     varies = np.array([in_variances and name not in NO_VARIANCES for name in names])
-    step = np.zeros(len(names))
-    for _ in range(TURNS if in_variances else 1):
+
+    def changed(step: Array) -> Array:
         # Half the relative change of a variance begins as its level's logarithm does.
-        change = np.where(varies, np.expm1(2.0 * step) / 2.0, step)
+        return np.where(varies, np.expm1(2.0 * step) / 2.0, step)
+
+    def gained(step: Array) -> float:
+        change = changed(step)
+        prior = 0.5 * float(np.sum((off + step) ** 2 - off**2)) / USUAL_SIGMA**2
+        return float(slope @ change - 0.5 * change @ H @ change) - prior
+
+    step, gain = np.zeros(len(names)), 0.0
+    for _ in range(TURNS if in_variances else 1):
         bend = np.where(varies, np.exp(2.0 * step), 1.0)
         known = np.eye(len(names)) / USUAL_SIGMA**2
-        rest = bend * (slope - H @ change) - (off + step) / USUAL_SIGMA**2
+        rest = bend * (slope - H @ changed(step)) - (off + step) / USUAL_SIGMA**2
         more = bounded(H * np.outer(bend, bend) + known, rest, low - step, high - step)
-        step = step + more
+        # A variance bends so much over a long step that it may end lower than it began.
+        while (higher := gained(step + more)) < gain and np.abs(more).max() >= ENOUGH:
+            more = more / 2.0
+        if higher < gain:
+            break
+        step, gain = step + more, higher
         if np.abs(more).max(initial=0.0) < ENOUGH:
             break
-    change = np.where(varies, np.expm1(2.0 * step) / 2.0, step)
-    gain = slope @ change - 0.5 * change @ H @ change
-    gain -= 0.5 * float(np.sum((off + step) ** 2 - off**2)) / USUAL_SIGMA**2
     found = centre
     for name, by in zip(names, np.exp(step).tolist(), strict=True):
         found = found.scaled(name, by)
-    return NoiseStep(found, float(gain))
+    return NoiseStep(found, gain)
 
 
 def bounded(H: Array, slope: Array, low: Array, high: Array) -> Array:

@@ -77,6 +77,22 @@ def test_a_step_of_variances_does_not_leave_what_is_known_of_their_logarithms():
     assert found.gain == pytest.approx(0.5 * (np.log(3.0) / USUAL_SIGMA) ** 2, rel=0.01)
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_no_step_is_expected_to_lose(seed):
+    """A variance bends: where levels trade, the way to its top may lead far beyond it.
+
+    A search that is told of a loss takes it for the end.
+    """
+    rng = np.random.default_rng(seed)
+    told, trade = np.exp(rng.normal(2.0, 2.0, len(ESTIMATED))), rng.normal(size=(30, 3))
+    moved = 0.01 * told[:, None] * (rng.normal(size=(len(told), 3)) @ trade.T)
+    rise = moved @ rng.normal(size=30)
+    at = USUAL
+    for name in ESTIMATED:
+        at = at.scaled(name, float(np.exp(rng.normal(0.0, 1.5))))
+    assert scoring_step(at, rise, moved @ moved.T, in_variances=True).gain >= 0.0
+
+
 def climbed(levels, change, steps=8):
     for _ in range(steps):
         levels = step(levels, change).levels
