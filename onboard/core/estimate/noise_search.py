@@ -117,4 +117,4 @@ class NoiseSearch:
         )
         self.settled = step.gain < WORTH_A_SEARCH
         self._before = levels
-        return levels if self.settled else step.levels
+        return step.levels
