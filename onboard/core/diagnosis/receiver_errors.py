@@ -92,7 +92,9 @@ class Looking:
             # The attitude is that of a flight without errors until they are known.
             found = self._chosen([x.tile for x in seen], np.array([x.off for x in seen]))
             left = self._left(found)
-        return tuple(self._told(x, left) for x in found if self._lasts(x, left))
+        told = (self._told(x, left) for x in found if self._lasts(x, left))
+        # Where a receiver is so noisy that it may be nothing, there is no error to be told.
+        return tuple(x for x in told if x.size**2 > needed(1) * x.sigma**2)
 
     def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
         """When velocities jump, s: a tile for each fix about some moments, the flight between."""
