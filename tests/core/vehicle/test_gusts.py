@@ -75,7 +75,7 @@ def test_an_unknown_that_gusts_do_not_touch_is_in_no_doubt():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [41, 42, 43])
+@pytest.mark.parametrize("seed", [41, 42])
 def test_gusts_alone_accuse_no_coefficient(seed):
     match = matched(seed=seed, gusts=0.5)
     assert told(match) == set()
