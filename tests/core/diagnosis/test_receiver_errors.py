@@ -129,13 +129,13 @@ def test_an_error_that_creeps_in_ends_where_the_receiver_jumps_back():
 
 @pytest.mark.slow
 def test_fixes_that_are_off_one_by_one_are_no_fault():
-    """Each second of a minute one fix is off, by something else: that is what gates are for."""
+    """Each second of half a minute one fix is off, by something else: that is what gates are for."""
     rng = np.random.default_rng(4718)
     faults = [
         concealed.GpsFault(
             start=50.0 + k, end=50.05 + k, north=rng.normal(0.0, 1.5), east=rng.normal(0.0, 1.5)
         )
-        for k in range(60)
+        for k in range(30)
     ]
     said, _ = told("copter", 4718, *faults)
     assert not any(effect.name == "gps_fault" for effect in said.effects)

@@ -74,15 +74,6 @@ def test_a_false_velocity_is_found_from_beginning_to_end():
 
 
 @pytest.mark.slow
-def test_a_fault_that_outlasts_the_filters_patience_ends_where_the_velocity_jumps_back():
-    fault = concealed.GpsFault(start=60.0, end=85.0, north=0.0, east=3.3)
-    said, first = diagnosed("copter", 46, fault, duration=150.0)
-    effect = next(e for e in said.effects if e.name == "gps_fault")
-    assert abs(effect.intervals[0][0] + first - fault.start) < 2.0
-    assert abs(effect.intervals[-1][1] + first - fault.end) < 2.0
-
-
-@pytest.mark.slow
 def test_a_warming_offset_is_not_shared_with_the_attitude_that_it_tilts():
     # The EKF levels with the accelerometer: 1.4 m/s^2 in the first minute tilt it by degrees.
     warm = {"temperature_start": 15.0, "temperature_end": 50.0, "temperature_time": 25.0}
