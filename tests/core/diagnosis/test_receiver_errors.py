@@ -129,7 +129,7 @@ def test_an_error_that_creeps_in_ends_where_the_receiver_jumps_back():
 
 @pytest.mark.slow
 def test_fixes_that_are_off_one_by_one_are_no_fault():
-    """Each second of half a minute one fix is off, by something else: that is what gates are for."""
+    """Each second of half a minute one fix is off, by something else: gates are for that."""
     rng = np.random.default_rng(4718)
     faults = [
         concealed.GpsFault(
