@@ -26,8 +26,10 @@ def document(tmp_path, port):
 
 
 @pytest.fixture(autouse=True)
-def impatient(monkeypatch):
-    hurried(monkeypatch)
+def impatient(request, monkeypatch):
+    """Who flies at many times its pace is listened to as closely as in real time."""
+    virtual = request.node.get_closest_marker("virtual_time") is not None
+    hurried(monkeypatch, virtual=virtual and not hasattr(request.module, "flying"))
 
 
 @pytest.fixture

@@ -23,6 +23,8 @@ from sitl.virtual_time import VirtualTimeLoop
 
 EPOCH = 1_800_000_000.0
 """Unix time at which virtual time begins, s."""
+POLL_S = 0.01
+"""Between two looks at what is waited for."""
 SIX = parameter_names(1).six
 
 
@@ -49,13 +51,19 @@ def known(monkeypatch):
     monkeypatch.setattr("onboard.daemon.learning.handover.Worker", employed)
 
 
-def hurried(monkeypatch):
-    """What real vehicles and real disks need seconds for takes none here."""
+def hurried(monkeypatch, *, virtual=False):
+    """What real vehicles and real disks need seconds for takes none here.
+
+    In ``virtual`` time seconds cost nothing, and rounds are what is paid for: they are as far
+    apart as the patience with a parameter allows.
+    """
     known(monkeypatch)
     monkeypatch.setattr(os, "fsync", lambda _: None)  # no power is cut, but tasks are
     client = ClientSettings(first_timeout_s=0.2, longest_timeout_s=0.4)
-    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)
-    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", 0.02)
+    tick_s, batch_s, poll_s = (0.12, 0.05, 0.05) if virtual else (0.05, 0.02, POLL_S)
+    monkeypatch.setattr("tests.daemon.daemons.POLL_S", poll_s)
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", tick_s)
+    monkeypatch.setattr("onboard.daemon.learning.limits.BATCH_S", batch_s)
     monkeypatch.setattr(pusher_module, "PATIENCE", TransactionSettings(client=client, settle_s=0.2))
 
 
@@ -84,7 +92,7 @@ async def until(condition, *, limit=300.0):
     """Wait until it holds; the limit only ends a hopeless test."""
     async with asyncio.timeout(limit):
         while not condition():
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(POLL_S)
 
 
 def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **changes):

@@ -60,7 +60,7 @@ async def test_a_plan_that_the_journal_does_not_take_is_not_begun(
         raise StateError("journal: No space left on device")
 
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        await until(lambda: service.parts.parameters.complete)
+        await until(lambda: service.handover.identified)
         monkeypatch.setattr(service.parts.journal, "append", full)
         convinced(service, WANTED)
         await until(lambda: service.snapshot().counters.get("journal_failed", 0) > 0)

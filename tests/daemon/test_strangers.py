@@ -294,7 +294,7 @@ async def test_samples_of_a_stranger_are_not_the_vehicles(document, daemon, port
 async def test_two_samples_of_one_stamp_are_both_dropped_and_shown(document, daemon, port):
     """From the vehicle's own address: nobody can tell which is true."""
     async with daemon(document) as service, Vehicle(port) as vehicle:
-        await until(lambda: service.parts.parameters.complete)
+        await until(lambda: service.handover.identified)
         convinced(service, WANTED)
         ms = int(vehicle.boot_ms) + 1
         kept = service.handover._samples

@@ -308,9 +308,10 @@ async def test_a_daemon_started_in_flight_waits_for_the_landing(document, daemon
 
 @pytest.mark.parametrize("where", ["feed", "poll", "consider"])
 async def test_a_fault_of_ours_in_a_push_ends_the_service_and_the_next_start_undoes_it(
-    document, daemon, port, where
+    document, daemon, port, where, monkeypatch
 ):
     """Who has lost count of what was written does not go on writing; the journal has not."""
+    monkeypatch.setattr("onboard.daemon.process.limits.TICK_S", 0.05)  # a round between two writes
     async with Vehicle(port) as vehicle:
         before = in_force(vehicle)
         service = made(document)

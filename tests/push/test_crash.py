@@ -5,7 +5,6 @@ storage, the journal says which, and nothing but the six was ever written.
 """
 
 import itertools
-import os
 import tempfile
 from pathlib import Path
 
@@ -18,12 +17,6 @@ from onboard.push.course import TransactionSettings
 from onboard.push.limits import UNCHANGED
 from onboard.push.signals import LinkLost, Rebooted, VehicleReport
 from tests.push.pushing import NEW, OLD, CrashError, PushWorld, Weather, make_plan
-
-
-@pytest.fixture(autouse=True)
-def no_fsync(monkeypatch):
-    """What matters here is the order of things, not the disk."""
-    monkeypatch.setattr(os, "fsync", lambda _: None)
 
 
 def assert_invariant(world, *, punctual=True):

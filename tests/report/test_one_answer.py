@@ -22,7 +22,6 @@ OTHER = type(TRUE)(scale=(0.99, 1.01, 0.985), offset=(-0.1, 0.15, 0.2))
 HIDDEN = {
     "nothing": (),
     "jump": (effects.BiasStep(time=50.0, x=0.4, y=-0.3, z=0.3),),
-    "axes": (effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05),),
 }
 
 
@@ -31,7 +30,7 @@ def flight(request, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp(request.param) / "flight.tlog"
     spec = FlightSpec(
         vehicle="plane",
-        duration=160.0,
+        duration=130.0,
         imus=(TRUE, OTHER),
         effects=HIDDEN[request.param],
         rates={"RAW_IMU": 25.0, "ATTITUDE": 25.0},

@@ -91,11 +91,12 @@ def test_in_the_mean_the_columns_give_back_what_was_cut_off(rng, cut, fractions)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vehicle", ["copter", "plane"])
-@pytest.mark.parametrize("cut", WHOLE)
+@pytest.mark.parametrize(
+    ("vehicle", "cut"), [("copter", "toward_zero"), ("plane", "down"), ("copter", "nearest")]
+)
 def test_a_flight_is_told_and_its_numbers_hold(vehicle, cut):
     effect = AccelerometerResolution(step=0.1, cut=cut)
-    samples = simulated(vehicle, 200.0, seed=11, imu=IMU, effects=[effect])[0]
+    samples = simulated(vehicle, 150.0, seed=11, imu=IMU, effects=[effect])[0]
     found = answer(fed(samples), 1)
     # Cut downward by half a step or not at all, in this flight and in all others of the sensor.
     alike = 0.05 / np.sqrt(3.0)

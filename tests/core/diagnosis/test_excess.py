@@ -52,7 +52,7 @@ def test_what_is_alike_is_said_once():
 @pytest.mark.parametrize(("size", "wrong"), [(0.05, False), (1.2, True)])
 def test_a_heading_that_wanders_by_a_radian_is_said(size, wrong):
     """Of three degrees it is what compasses do; of seventy a filter can make a perfect fit, too."""
-    spec = FlightSpec(vehicle="copter", seed=5, duration=150.0, imus=random_imus(5))
+    spec = FlightSpec(vehicle="copter", seed=5, duration=110.0, imus=random_imus(5))
     made, decoder = Calibrator(CalibratorSettings(refine=False, buffer_s=3600.0)), Decoder()
     for _, message in fly_messages(spec):
         for sample in decoder.decode(message):

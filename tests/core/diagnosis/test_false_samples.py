@@ -36,10 +36,3 @@ def test_false_samples_are_no_averaging_no_antenna_and_no_hysteresis(size, share
     off = (np.array(c.scale + c.offset) - SIX) / np.array(c.scale_sigma + c.offset_sigma)
     assert np.max(np.abs(off)) < 3.5
     assert c.status is Status.CALIBRATED
-
-
-@pytest.mark.slow
-def test_without_them_nothing_is_left_out():
-    found = asked()
-    assert beside_latency(found) == []
-    assert found.calibration.status is Status.CALIBRATED

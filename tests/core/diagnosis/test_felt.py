@@ -63,7 +63,7 @@ def changed(samples):
 
 @pytest.fixture(scope="module")
 def flight():
-    return flown("copter", 100.0, seed=6)[0]
+    return flown("copter", 80.0, seed=6)[0]
 
 
 @pytest.mark.slow

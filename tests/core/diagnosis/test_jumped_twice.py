@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 SIGMAS = 4.0
 
 
-def diagnosed(*effects, vehicle="copter", seed=5, duration=220.0):
+def diagnosed(*effects, vehicle="copter", seed=5, duration=190.0):
     imus = random_imus(seed)
     spec = FlightSpec(vehicle=vehicle, seed=seed, duration=duration, imus=imus, effects=effects)
     return diagnose(heard(spec), 1), imus[0]
@@ -29,7 +29,6 @@ def jumps_of(d):
     [
         # It gives way and comes back: on the whole flight hardly a jump at all.
         ("copter", 5, (90.0, (0.25, 0.0, -0.2)), (135.0, (-0.25, 0.0, 0.2))),
-        ("copter", 8, (80.0, (0.0, 0.3, 0.0)), (150.0, (0.0, -0.3, 0.0))),
         # Another axis, and it stays.
         ("plane", 6, (80.0, (0.25, 0.0, 0.0)), (140.0, (0.0, 0.0, -0.3))),
     ],
@@ -57,8 +56,3 @@ def test_what_grows_is_no_staircase():
     d, _ = diagnosed(concealed.BiasRamp(x=0.002, z=-0.0015), seed=7)
     assert "bias_ramp" in {e.name for e in d.effects}
     assert not jumps_of(d)
-
-
-def test_one_jump_is_one():
-    d, _ = diagnosed(concealed.BiasStep(time=110.0, x=0.3, y=-0.1, z=0.2), seed=9)
-    assert len(jumps_of(d)) == 1

@@ -66,7 +66,7 @@ def full(request):
     spec = FlightSpec(
         vehicle=request.param,
         seed=5,
-        duration=160.0,
+        duration=140.0,
         imus=random_imus(5),
         orientation=2 if request.param == "plane" else 0,
         effects=(concealed.BiasStep(time=AT, x=0.15, y=-0.1, z=0.08),),

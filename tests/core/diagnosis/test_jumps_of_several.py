@@ -23,7 +23,7 @@ from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, fly_messages
 
 AT = 61.3
-SPEC = FlightSpec(vehicle="copter", seed=23, duration=130.0, imus=random_imus(23, 3))
+SPEC = FlightSpec(vehicle="copter", seed=23, duration=110.0, imus=random_imus(23, 3))
 
 
 @functools.cache

@@ -12,7 +12,7 @@ OFF = 0.1
 """rad; six degrees: twice what the slow error of a heading may be at any time."""
 
 
-def diagnosed(vehicle, seed, *effects, duration=150.0):
+def diagnosed(vehicle, seed, *effects, duration=120.0):
     spec = FlightSpec(
         vehicle=vehicle,
         duration=duration,
@@ -24,8 +24,8 @@ def diagnosed(vehicle, seed, *effects, duration=150.0):
     return diagnose(heard(spec), 1)
 
 
-@pytest.mark.parametrize(("vehicle", "seed"), [("copter", 41), ("plane", 42)])
-@pytest.mark.parametrize("off", [OFF, -OFF])
+@pytest.mark.slow
+@pytest.mark.parametrize(("vehicle", "seed", "off"), [("copter", 41, OFF), ("plane", 42, -OFF)])
 def test_a_heading_that_is_off_all_along_is_named(vehicle, seed, off):
     made = diagnosed(vehicle, seed, fx.HeadingError(yaw=off))
     (effect,) = (e for e in made.effects if e.name == "heading_error")
@@ -35,6 +35,7 @@ def test_a_heading_that_is_off_all_along_is_named(vehicle, seed, off):
     assert not any("heading_error" in a.names for a in made.ambiguous)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vehicle", "seed"), [("copter", 41), ("plane", 42)])
 def test_a_heading_that_is_right_is_not(vehicle, seed):
     made = diagnosed(vehicle, seed)

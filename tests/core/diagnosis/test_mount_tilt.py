@@ -46,15 +46,19 @@ def diagnosed(flown):
     return diagnose(made, 1)
 
 
-LATEST = {}
+FLIGHTS = {}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forgotten():
+    """Flights are long: they go when they have been asked."""
+    yield
+    FLIGHTS.clear()
 
 
 def flight_of(flown):
-    """The flight, flown once for its diagnosis and its attitude, which follow on each other."""
-    if repr(flown) not in LATEST:
-        LATEST.clear()
-        LATEST[repr(flown)] = run(flown)
-    return LATEST[repr(flown)]
+    """The flight, flown once for its diagnosis and for all that ask for its attitude."""
+    return FLIGHTS.get(repr(flown)) or FLIGHTS.setdefault(repr(flown), run(flown))
 
 
 def attitude_error(flown):

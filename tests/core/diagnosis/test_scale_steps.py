@@ -42,8 +42,9 @@ def asked(vehicle, effect):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vehicle", ["copter", "plane"])
-@pytest.mark.parametrize("size", [(0.02, 0.02, 0.02), (-0.03, -0.03, 0.01)])
+@pytest.mark.parametrize(
+    ("vehicle", "size"), [("copter", (0.02, 0.02, 0.02)), ("plane", (-0.03, -0.03, 0.01))]
+)
 def test_a_jump_of_the_scale_is_one(vehicle, size):
     step = concealed.ScaleStep(time=AT, **dict(zip("xyz", size, strict=True)))
     found, told = asked(vehicle, step)
@@ -58,8 +59,7 @@ def test_a_jump_of_the_scale_is_one(vehicle, size):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vehicle", ["copter", "plane"])
-def test_a_jump_of_the_offset_that_level_flight_takes_for_one_of_the_scale_is_none(vehicle):
-    _, told = asked(vehicle, concealed.BiasStep(time=AT, z=0.2))
+def test_a_jump_of_the_offset_that_level_flight_takes_for_one_of_the_scale_is_none():
+    _, told = asked("plane", concealed.BiasStep(time=AT, z=0.2))
     assert told.name == "bias_step"
     assert told.unknowns["z"].value == pytest.approx(0.2, abs=0.02)

@@ -93,7 +93,7 @@ def test_no_more_of_the_past_is_asked_for_than_there_is():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("vehicle", "hertz"), [("copter", 1.3), ("copter", 2.0), ("plane", 1.5)])
+@pytest.mark.parametrize(("vehicle", "hertz"), [("copter", 2.0), ("plane", 1.5)])
 def test_a_flight_that_conceals_it_is_explained_by_its_name(vehicle, hertz):
     concealed = Concealed(square=(2.0 * math.pi * hertz) ** -2)
     spec = Secret(641, vehicle, "control").spec()

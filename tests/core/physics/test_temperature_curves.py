@@ -124,9 +124,12 @@ def test_its_curve_is_drawn_with_its_shape_and_said_by_its_range():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vehicle", ["copter", "plane"])
 @pytest.mark.parametrize(
-    ("square", "cube"), [((2e-3, -1e-3, 2e-3), (0.0,) * 3), ((0.0,) * 3, (3e-4, 2e-4, -3e-4))]
+    ("vehicle", "square", "cube"),
+    [
+        ("copter", (2e-3, -1e-3, 2e-3), (0.0,) * 3),
+        ("plane", (0.0,) * 3, (3e-4, 2e-4, -3e-4)),
+    ],
 )
 def test_warming_up_along_a_curve_is_told_as_temperature(vehicle, square, cube):
     drift = concealed.TemperatureDrift(square=square, cube=cube)

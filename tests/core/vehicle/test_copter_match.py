@@ -178,7 +178,7 @@ def test_a_hover_says_little_and_says_so():
 
 def test_sigmas_cover_the_truth_over_many_flights():
     misses = []
-    for seed in range(12):
+    for seed in range(8):
         numbers = matched(copter_flight(wind=(2.0, -1.0), seconds=120.0, seed=100 + seed)).numbers
         for key, truth in (("wind.north", 2.0), ("wind.east", -1.0), ("thrust_curve.expo", 0.65)):
             misses.append(abs(numbers[key].real - truth) / numbers[key].sigma)
@@ -204,7 +204,7 @@ def test_motors_that_follow_late_have_the_time_constant_of_their_low_pass():
     assert number.sigma < 0.01
 
 
-@pytest.mark.parametrize("late", [0.05, 0.1, 0.17])
+@pytest.mark.parametrize("late", [0.05, 0.17])
 def test_outputs_that_are_logged_late_are_a_delay_of_the_log_and_no_motor(late):
     flight = copter_flight(seed=22)
     command = np.interp(flight.t - late, flight.t, flight.commands[:, 0])
@@ -216,7 +216,7 @@ def test_outputs_that_are_logged_late_are_a_delay_of_the_log_and_no_motor(late):
     assert abs(delay.real - late) < 3.0 * delay.sigma + 0.005
 
 
-@pytest.mark.parametrize("seed", [31, 32, 33, 34])
+@pytest.mark.parametrize("seed", [31, 32])
 def test_rotors_that_lean_ahead_and_aside_alike_are_not_said_to_drag_less(seed):
     """The simulator's form of the drag and less of it would do as well: it is one effect more."""
     match = matched(copter_flight(tilt=(0.036, -0.036), seed=seed, noise=0.03))

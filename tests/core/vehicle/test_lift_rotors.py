@@ -96,9 +96,8 @@ def test_rotors_that_tilt_do_not_tell_when_they_carry(tilts):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_hover_between_is_no_other_wing(seed):
-    flight = lifted(plane_flight(seed=seed, wind=(2.0, -3.0), **HEAVY), *MOSTLY)
+def test_a_hover_between_is_no_other_wing():
+    flight = lifted(plane_flight(seed=1, wind=(2.0, -3.0), **HEAVY), *MOSTLY)
     match = matched(on_wings(flight, spinning(flight, MOSTLY))[0])
     assert names(match) == {"wind", "lift", "side_force"}
     assert match.explained

@@ -136,7 +136,7 @@ def test_drag_is_known_no_better_than_the_law_of_the_propeller():
 
 def test_a_heading_as_good_as_compasses_are_has_no_name_and_leaves_less_than_a_bad_one():
     good, bad = (
-        [matched(plane_flight(seed=seed, heading_off=off)) for seed in range(10, 16)]
+        [matched(plane_flight(seed=seed, heading_off=off)) for seed in range(10, 14)]
         for off in (0.02, 0.1)
     )
     assert all(names(match) == set() for match in good)
@@ -274,7 +274,7 @@ def rolling(flight, seconds):
     )
 
 
-@pytest.mark.parametrize("seed", range(20, 25))
+@pytest.mark.parametrize("seed", range(20, 22))
 def test_what_no_airframe_does_bends_no_number(seed):
     flight = plane_flight(
         seed=seed, seconds=150.0, wind=(-3.0, -6.0), c_drag_p=0.145, throttle_swing=0.12
@@ -333,7 +333,7 @@ def test_several_flights_keep_their_commands_apart():
     assert together.commands == pytest.approx(np.concatenate(alone), abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", [41, 42, 43])
+@pytest.mark.parametrize("seed", [41, 42])
 def test_on_a_straight_and_even_flight_a_heading_that_is_off_is_no_wind_that_is_sure(seed):
     """Two degrees at 24 m/s are 0.9 m/s across: by sideslip they were told to 0.04 m/s."""
     still = {"turning": 0.0, "speeds": 0.0}
