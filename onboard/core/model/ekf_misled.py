@@ -1,8 +1,11 @@
-"""What an EKF makes of velocities that were false for a while: it may have believed them.
+"""What an EKF makes of what begins in flight: velocities that are false, an offset that jumps.
 
 A receiver that is off by a metre a second is within the gates of an EKF, which tilts until its
 accelerometer agrees.  Fixes that are known to be false are not fitted, but the recorded attitude
 has seen them, and were it held for right, it would be held against the accelerometer.
+
+An offset that jumps tilts it too, until it has learned the new one.  Were the tilt held for right,
+as much of the jump would be missing.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from onboard.core.maths.frames import rotation_from_euler
 from onboard.core.model.around import Around
 from onboard.core.model.autopilot_attitude import STEP_S, filter_of
 from onboard.core.model.ekf3_filter import Ekf3, Misled
+from onboard.core.model.nuisances import AXIS
 from onboard.core.model.regressors import NOTHING, Direct, Family, Unknown
 from onboard.core.model.sensor_errors import Steps
 
@@ -26,26 +30,11 @@ AXES: Final = ("north", "east")
 """Of a vertical velocity that is false nothing tilts, to first order."""
 
 
-class EkfMisled(Family):
-    """Errors of the recorded attitude by velocities that were false from one moment to another.
-
-    A nuisance, north and east for each: an EKF believes all of an error, or refuses it, or takes
-    some of it, so that each is as large as the error at most, and nothing beforehand.
-    """
-
-    name = "ekf_misled"
-
-    def __init__(self, intervals: Sequence[tuple[float, float]], size: float) -> None:
-        """Take from when to when velocities were false, s on the boot clock, and by what, m/s."""
-        self.intervals = tuple(intervals)
-        self.unknowns = tuple(
-            Unknown(f"ekf_misled_{i}_{axis}", "m/s", 0.0, size)
-            for i in range(len(self.intervals))
-            for axis in AXES
-        )
+class _Answer(Family):
+    """Errors of the recorded attitude that an EKF makes of others, which begin in flight."""
 
     def attitude(self, around: Around) -> Direct:
-        """Of these velocities."""
+        """Of these errors."""
         told = around.now.slow(self.name)
         if told is None:
             return NOTHING
@@ -63,18 +52,57 @@ class EkfMisled(Family):
             t, R = _attitudes(segment, before)
             if isinstance(by := filter_of(segment), Ekf3) and len(t) > 1:
                 state = state or _settled(by, segment, R[0], len(self.unknowns))
-                steps = Steps.between(segment, t, R)
-                x, state = by.misled(steps, state, self._false(t[1:]))
+                x, state = self._through(by, Steps.between(segment, t, R), state, t[1:])
                 before = _joined(before, (t, x.reshape(len(t), -1)), segment.t[0])
                 segment = segment.with_slow({**segment.slow, self.name: before})
             out.append(replace(batch, segment=segment))
         return out
 
-    def _false(self, t: Array) -> Array:
-        """(n, 3, m) what velocities are too large by at times (n,), NED, m/s per unit."""
+    def _through(self, by: Ekf3, steps: Steps, state: Misled, t: Array) -> tuple[Array, Misled]:
+        """Its attitude (n + 1, 3, m) over n steps that end at ``t``, and states at their end."""
+        raise NotImplementedError
+
+
+class EkfMisled(_Answer):
+    """Of velocities that were false from one moment to another.
+
+    A nuisance, north and east for each: an EKF believes all of an error, or refuses it, or takes
+    some of it, so that each is as large as the error at most, and nothing beforehand.
+    """
+
+    name = "ekf_misled"
+
+    def __init__(self, intervals: Sequence[tuple[float, float]], size: float) -> None:
+        """Take from when to when velocities were false, s on the boot clock, and by what, m/s."""
+        self.intervals = tuple(intervals)
+        self.unknowns = tuple(
+            Unknown(f"ekf_misled_{i}_{axis}", "m/s", 0.0, size)
+            for i in range(len(self.intervals))
+            for axis in AXES
+        )
+
+    def _through(self, by: Ekf3, steps: Steps, state: Misled, t: Array) -> tuple[Array, Misled]:
         inside = np.stack([(t >= a) & (t <= b) for a, b in self.intervals], axis=-1)
         each = inside[:, None, :, None] * np.eye(3)[:, None, : len(AXES)]
-        return np.asarray(each.reshape(len(t), 3, -1), dtype=np.float64)
+        return by.misled(steps, state, each.reshape(len(t), 3, -1).astype(np.float64))
+
+
+class EkfJumped(_Answer):
+    """Of an offset that jumped at one moment.
+
+    A nuisance of its own beside the jump: which accelerometer an EKF uses a recording need not
+    tell.
+    """
+
+    def __init__(self, moment: float, sigma: Array) -> None:
+        """Take the moment, s on the boot clock, and prior sigmas of the jump (3,), m/s^2."""
+        self.moment = moment
+        self.name = f"ekf_jumped_{moment:.2f}"
+        each = zip(AXIS, sigma.tolist(), strict=True)
+        self.unknowns = tuple(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, s) for a, s in each)
+
+    def _through(self, by: Ekf3, steps: Steps, state: Misled, t: Array) -> tuple[Array, Misled]:
+        return by.jumped(steps, state, (t > self.moment).astype(np.float64))
 
 
 def _attitudes(segment: Segment, before: Signal | None) -> Signal:
