@@ -14,7 +14,7 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
-from onboard.core.diagnosis.screening import false_fixes, unbelieved, unclipped
+from onboard.core.diagnosis.screening import false_fixes, misled, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
@@ -102,13 +102,14 @@ def cleared(
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
         fault = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
+        believed, false = misled(unbelieved(full, fault, origin.t0), fault, origin.t0)
         full = Examination(
             engine,
             testable,
             t0=origin.t0,
-            batches=unbelieved(full, fault, origin.t0),
+            batches=believed,
             start=full,
-            carried=carried,
+            carried=(*carried, *false),
         ).with_noise()
     full.let_epochs_go()
     said = None if coarse is None else coarse.finding

@@ -23,9 +23,11 @@ from onboard.core.filter.traces import EpochTrace, PassResult, Traces
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
+from onboard.core.model.ekf_misled import EkfJumped
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Family
 from onboard.core.physics.effect import Effect
+from onboard.core.physics.effects.bias_step import BiasStep
 
 VELOCITY = ("velocity", "recovery")
 """Gates that refuse a velocity."""
@@ -70,16 +72,19 @@ class Examination(Engine):
         self.traced = traced
         self.traces = Traces()
         self._refused: Refused | None = None
+        answers = _answers((*families, *self.carried), like.settings.needs.prior_offset)
         super().__init__(
             replace(like.settings, refine=True),
             like.prior,
             point,
             origin.noise,
             uses=Uses(refused=refused),
-            more=(*families, *self.carried),
+            more=(*families, *self.carried, *answers),
         )
         self._refused_by: Engine | None = like
         self.batches = list(like.batches if batches is None else batches)
+        for answer in answers:
+            self.batches = answer.along(self.batches)
         self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
         self.sample = _sampled(self.batches)
@@ -269,6 +274,18 @@ class Examination(Engine):
     def indices_of(self, families: Sequence[Effect]) -> list[int]:
         """Columns of some families."""
         return [i for f in families for i in self.indices(f)]
+
+
+def _answers(families: Sequence[Family], most: float) -> tuple[EkfJumped, ...]:
+    """What the EKF makes of each jump of the offset among some families.
+
+    Its accelerometer has jumped by no more than is known of the jump, or offsets are, m/s^2.
+    """
+    jumps = [f for f in families if isinstance(f, BiasStep) and f.onset is not None]
+    sizes = {
+        f.moment: np.array([np.hypot(u.prior, u.prior_sigma) for u in f.unknowns]) for f in jumps
+    }
+    return tuple(EkfJumped(at, np.minimum(sizes[at], most)) for at in sorted(sizes))
 
 
 def _sampled(batches: Sequence[Batch]) -> list[list[Batch]]:

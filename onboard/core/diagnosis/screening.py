@@ -28,6 +28,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.traces import residual
 from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.segments import Batch
+from onboard.core.model.ekf_misled import EkfMisled
 from onboard.core.physics.finding import Finding
 
 
@@ -113,6 +114,20 @@ def unbelieved(full: Examination, fault: Finding, t0: float) -> list[Batch]:
         bad = within(full.point.true_time(batch.fixes.t) - t0, fault.intervals)
         out.append(replace(batch, trusted=batch.trusted & ~bad))
     return out
+
+
+def misled(
+    batches: Sequence[Batch], fault: Finding, t0: float
+) -> tuple[list[Batch], tuple[EkfMisled, ...]]:
+    """The flight with what its EKF may have made of false velocities, and columns of it.
+
+    Of those that nothing says the size of there are none.
+    """
+    size = fault.unknowns.get("offset")
+    if size is None:
+        return list(batches), ()
+    columns = EkfMisled([(a + t0, b + t0) for a, b in fault.intervals], size.value)
+    return columns.along(batches), (columns,)
 
 
 def _distrusted(calibrator: Calibrator, full: Examination, t0: float) -> list[tuple[float, float]]:

@@ -8,7 +8,7 @@ along the flight, for the noise that EKF3 believes in.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Final, Self
@@ -19,7 +19,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import skew
 from onboard.core.maths.kalman_errors import FIRST, kalman_errors
 from onboard.core.maths.leaky import leaky_integral
-from onboard.core.model.sensor_errors import ERRORS, GRAVITY, Steps
+from onboard.core.model.sensor_errors import BETA, ERRORS, GRAVITY, Steps
 
 SIZE: Final = 15
 """States: attitude (rad), velocity (m/s) and place (m), NED; biases of accelerometer and gyroscope,
@@ -88,6 +88,29 @@ class State:
         return type(self)(both @ self.x, both @ self.P @ both.T, shown, told_n)
 
 
+@dataclass(frozen=True, slots=True)
+class Misled:
+    """What errors that begin in flight do to an EKF's states, per unit of each of m errors.
+
+    Attributes:
+        x: (s, m) errors; velocity counts from what it was told.
+        P: (s, s) its covariance.
+        unshown: (3 m,) what it has corrected of its attitude and does not report yet, rad.
+        off_n: (3, m) what velocities were too large by in the step before, NED, m/s.
+    """
+
+    x: Array
+    P: Array
+    unshown: Array
+    off_n: Array
+
+    @classmethod
+    def nothing_yet(cls, states: Array, count: int) -> Self:
+        """Of a filter in such states that has heard no error of ``count``."""
+        x, P = np.zeros((SIZE, count)), State.unpacked(states).P
+        return cls(x, P, np.zeros(3 * count), np.zeros((3, count)))
+
+
 class Ekf3:
     """The filter."""
 
@@ -125,6 +148,44 @@ class Ekf3:
         for stop, row in zip(stop_after, kept, strict=True):
             row[-2 * len(pole) : -len(pole)] = unshown[stop]
         return whole.reshape(unshown.shape) - unshown, kept
+
+    def misled(self, steps: Steps, before: Misled, off_n: Array) -> tuple[Array, Misled]:
+        """What velocities that are false, of places that are right, make of its attitude.
+
+        Args:
+            steps: n of them.
+            before: what there is of it.
+            off_n: (n, 3, m) what velocities are too large by, NED, m/s per unit.
+
+        Returns:
+            (n + 1, 3, m), NED, rad per unit, before and after each step; what there is of it then.
+        """
+        every = np.concatenate([before.off_n[None], off_n])
+        pushed = np.zeros((len(steps.h), MOVED, off_n.shape[2]))
+        # Counted from false velocities it is too slow, and its places move by what it is not.
+        pushed[:, 3:6] = -np.diff(every, axis=0)
+        pushed[:, 6:] = every[:-1] * steps.h[:, None, None]
+        attitude, state = self._answer(steps, before, pushed)
+        return attitude, replace(state, off_n=every[-1])
+
+    def jumped(self, steps: Steps, before: Misled, after: Array) -> tuple[Array, Misled]:
+        """The same of an offset (3,) that has jumped, in the steps that are ``after`` it, (n,)."""
+        pushed = np.zeros((len(steps.h), MOVED, len(BETA)))
+        pushed[:, 3:6] = steps.force[..., BETA] * after[:, None, None]
+        return self._answer(steps, before, pushed)
+
+    def _answer(self, steps: Steps, before: Misled, pushed: Array) -> tuple[Array, Misled]:
+        """The attitude that it reports of what errors ``pushed`` (n, r, m) its states by."""
+        moves, noise, variance = _filter(steps)
+        x, P = before.x.copy(), before.P.copy()
+        begun = x[None, :FIRST].copy()
+        told = kalman_errors(moves, pushed, noise, OBSERVED, variance, x, P)
+        whole = np.concatenate([begun, told])
+        corrected = np.diff(whole, axis=0).reshape(len(told), -1)
+        t = np.concatenate([[0.0], np.cumsum(steps.h)])
+        pole = np.full(corrected.shape[1], -1.0 / SHOWN_S)
+        unshown = leaky_integral(t, corrected, pole, before.unshown)
+        return whole - unshown.reshape(whole.shape), Misled(x, P, unshown[-1], before.off_n)
 
 
 @lru_cache(maxsize=4)

@@ -1,8 +1,12 @@
 """A receiver that is off for a while: when and by what; it is no jump of the accelerometer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from benchmarks.explaining import heard
+from onboard.core.diagnosis.procedure import diagnose
 from onboard.core.diagnosis.records import Verdict
 from sitl.builtin import effects as concealed
 from sitl.builtin.truth import random_imus
@@ -139,3 +143,33 @@ def test_fixes_that_are_off_one_by_one_are_no_fault():
     ]
     said, _ = told("copter", 4718, *faults)
     assert not any(effect.name == "gps_fault" for effect in said.effects)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("vehicle", "seed", "ends", "fault", "warming", "delay"),
+    [
+        ("copter", 306, 94.32, (38.242, 57.782, 1.713, -1.641), (8.49, 52.12, 16.91), 0.0479),
+        ("plane", 401, 129.03, (72.654, 83.209, 1.524, 1.780), (12.45, 49.96, 33.03), 0.0366),
+        ("plane", 403, 121.54, (61.829, 82.638, -1.213, 1.734), (15.0, 40.53, 24.62), 0.0299),
+    ],
+)
+def test_what_an_ekf_was_misled_by_is_no_drift(vehicle, seed, ends, fault, warming, delay):
+    """Of a short flight: it tilts to where its accelerometer agrees with what it was told."""
+    start, end, north, east = fault
+    cold, warm, soon = warming
+    (imu,) = random_imus(seed)
+    imu = replace(imu, temperature_start=cold, temperature_end=warm, temperature_time=soon)
+    spec = FlightSpec(
+        vehicle=vehicle,
+        seed=seed,
+        duration=ends,
+        imus=(imu,),
+        gps=replace(PROMPT, delay=delay),
+        effects=(concealed.GpsFault(start=start, end=end, north=north, east=east),),
+    )
+    said = diagnose(heard(spec), 1)
+    assert [e.name for e in said.effects] == ["gps_fault"]
+    c = said.calibration
+    error = np.array((*c.scale, *c.offset)) - np.array((*imu.scale, *imu.offset))
+    assert np.all(np.abs(error) < 3.0 * np.sqrt(np.diag(c.with_its_gyroscope)))
