@@ -5,8 +5,7 @@ calls cost, and with what is known of the matrices: most of a transition is zero
 covariance is symmetric.  Rows of a state are 0 to 2 velocity, 3 height, 4 to 6 attitude, 7 to 9
 bias, 10 to 16 the slow errors, 17 the rate of the last (:mod:`onboard.core.filter.state`).
 
-Compiled code is kept on disk (:mod:`onboard.core.maths.compiler`).  numba notices changes of this
-file alone: whoever changes the order of the states has to touch it.
+Compiled code is kept on disk (:mod:`onboard.core.maths.compiler`).
 """
 
 from __future__ import annotations

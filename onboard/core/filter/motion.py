@@ -1,8 +1,7 @@
 """One step of the filter with the attitude that goes with it, as loops that numba compiles.
 
 What :class:`~onboard.core.filter.whitening.WhiteningFilter` does in Python between calls of
-:mod:`onboard.core.filter.loops`, equal to it to rounding.  numba notices changes of this file
-alone: whoever changes the other one has to touch this one, too.
+:mod:`onboard.core.filter.loops`, equal to it to rounding.
 """
 
 from __future__ import annotations

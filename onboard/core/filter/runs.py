@@ -2,9 +2,7 @@
 
 What :class:`~onboard.core.filter.whitening.WhiteningFilter` does to an epoch of which a gate
 refuses nothing, epoch after epoch, until one is not like that.  Equal to it to rounding, in all 18
-states (:mod:`~onboard.core.filter.state`).  numba notices changes of this file alone: whoever
-changes :mod:`~onboard.core.filter.loops`, :mod:`~onboard.core.filter.motion` or
-:mod:`~onboard.core.filter.tail_loops` has to touch this one, too.
+states (:mod:`~onboard.core.filter.state`).
 """
 
 from __future__ import annotations

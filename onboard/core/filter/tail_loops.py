@@ -2,8 +2,7 @@
 
 :func:`onboard.core.filter.innovation_gates.tails`, and what
 :class:`~onboard.core.filter.whitening.WhiteningFilter` makes of them where no gate refuses
-anything, equal to both to rounding.  numba notices changes of a file alone: whoever changes this
-one has to touch :mod:`onboard.core.filter.runs`.
+anything, equal to both to rounding.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Signals at nodes and how the attitude turns from one to the next, in one go.
-
-numba notices changes of this file alone: whoever changes parts of the curves or of the turns has to
-touch it.
-"""
+"""Signals at nodes and how the attitude turns from one to the next, in one go."""
 
 from __future__ import annotations
 

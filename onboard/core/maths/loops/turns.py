@@ -1,7 +1,4 @@
-"""Turns by the gyroscope, and an attitude between its samples as they go.
-
-numba notices changes of this file alone: whoever changes ``place`` of the curves has to touch it.
-"""
+"""Turns by the gyroscope, and an attitude between its samples as they go."""
 
 from __future__ import annotations
 
