@@ -202,7 +202,7 @@ def _row(label: str, outcomes: list[Outcome]) -> str:
         if abs(m.truth) > 0 and abs(m.truth) > 2.0 * m.sigma
     ]
     onsets = [abs(t) for o in found for t in o.onset_s]
-    better = [o.held_out for o in found if np.all(np.isfinite(o.held_out))]
+    better = [o.held_out for o in found if np.all(np.isfinite(o.held_out)) and o.held_out[0] > 0.0]
     gain = float(np.median([1.0 - b / a for a, b in better])) if better else float("nan")
     cells = [
         f"{label:26}",
