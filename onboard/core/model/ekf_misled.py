@@ -60,7 +60,7 @@ class _Answer(Family):
 
     def _through(self, by: Ekf3, steps: Steps, state: Misled, t: Array) -> tuple[Array, Misled]:
         """Its attitude (n + 1, 3, m) over n steps that end at ``t``, and states at their end."""
-        raise NotImplementedError
+        raise NotImplementedError  # abstract: each error drives the EKF in its own way
 
 
 class EkfMisled(_Answer):
