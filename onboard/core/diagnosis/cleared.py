@@ -227,8 +227,7 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
     if little and not drowned(batches, density):
         return sampled
-    walk = (batches[0].segment.R_bs ** 2).T @ sampled.noise.walk_b
-    noise = np.minimum(white(density), walk)
+    noise = np.minimum(white(density), sampled.noise.walk_s(batches[0].segment.R_bs))
     felt = asked.examined(expected(batches, density, noise), sampled)
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 

@@ -81,6 +81,11 @@ class NoiseLevels:
         """(3,) variance by which the velocity walks along body axes, (m/s)^2/s."""
         return np.array([self.force_walk, self.force_walk, self.lift_walk]) ** 2
 
+    def walk_s(self, R_bs: Array) -> Array:
+        """(3,) the same along the axes of a sensor that R_bs (3, 3) turns to the body's."""
+        out: Array = (R_bs**2).T @ self.walk_b
+        return out
+
     @property
     def as_seen(self) -> NoiseLevels:
         """The same with a heading that is forgotten as soon as what was seen of its error is.

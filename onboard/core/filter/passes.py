@@ -328,11 +328,11 @@ class Pass:
             return
         # What looks like noise sample by sample may be a tone that integrates to nothing; the
         # velocity's random walk, found from the residuals, is all that it can amount to.
+        walk = self.filter.bank[0].walk_s(segment.R_bs)
+        density = np.minimum(segment.once(noise_density), walk)
         at = self.model.slices["six"].start
-        # Gram and walk are by body axes; the sensor's are permuted or mixed by R_bs.
-        mixed = (segment.R_bs**2).T
-        density = np.minimum(segment.once(noise_density), mixed @ self.filter.bank[0].walk_b)
-        sensor = mixed @ gram
+        # The Gram is by body axes; the sensor's are permuted or mixed by R_bs.
+        sensor = (segment.R_bs**2).T @ gram
         for j in range(3):
             sums.G[at + j] = density[j] * sensor[j]
 
