@@ -42,6 +42,8 @@ class Vehicle(asyncio.DatagramProtocol):
         self.sets = []
         self.heard = []
         self.mute_after_sets = None
+        self.when_set = {}
+        """What happens, at once, when it has taken so many writes."""
         self.denied = set()
         self._address = ("127.0.0.1", port)
         self._firmware = firmware
@@ -133,6 +135,7 @@ class Vehicle(asyncio.DatagramProtocol):
         if self.mute_after_sets is not None and len(self.sets) >= self.mute_after_sets:
             return
         self.sets.append((message.param_id, message.param_value))
+        self.when_set.pop(len(self.sets), lambda: None)()
         if message.param_id not in self.denied and message.param_id in self.parameters:
             self.parameters[message.param_id] = message.param_value
         self._tell(message.param_id)

@@ -96,9 +96,10 @@ async def test_a_transaction_on_whose_way_the_disk_fails_leaves_all_old(
 ):
     async with daemon(document) as service, Vehicle(port) as vehicle:
         before = in_force(vehicle)
-        convinced(service, WANTED)
-        await until(lambda: len(vehicle.sets) == 3)
-        with failing(monkeypatch, state(document)):
+        with ExitStack() as disk:
+            vehicle.when_set[3] = lambda: disk.enter_context(failing(monkeypatch, state(document)))
+            convinced(service, WANTED)
+            await until(lambda: len(vehicle.sets) >= 3)
             await until(lambda: not service.parts.pusher.busy)
             assert in_force(vehicle) == pytest.approx(before)
             count, taken_up = len(vehicle.sets), len(notices(service, "push_resumed"))
