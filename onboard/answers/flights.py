@@ -10,6 +10,7 @@ before it (or, for the first ones, after it).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -59,6 +60,12 @@ class Flights:
     def standing_s(self) -> float:
         """Time on the ground, which teaches nothing, s."""
         return sum(flight.standing_s for flight in self._flights)
+
+    @property
+    def refused(self) -> Mapping[str, int]:
+        """Fixes that were refused, by reason, where GPS was never trusted; else empty."""
+        every = [flight.refused for flight in self._flights]
+        return sum(map(Counter, every), Counter[str]()) if all(every) else {}
 
     @property
     def parameters(self) -> Mapping[str, float]:

@@ -19,7 +19,7 @@ from onboard.answers.kept_motion import motion_of
 from onboard.answers.recorded import PAUSE_S, Recorded, later, unanswered
 from onboard.answers.replay import Reading, read
 from onboard.answers.sensors import NO_SENSORS, sensors_of
-from onboard.answers.stands import fixes_of, said_to_stand, with_landings, without_flight
+from onboard.answers.stands import NO_FLIGHT, fixes_of, said_to_stand, with_landings, without_flight
 from onboard.core.diagnosis.records import Diagnosis
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
@@ -71,6 +71,8 @@ class Flown:
         self.ground = 0.0
         self.flying: list[Batch] = []
         self.kind = ""
+        self.heard = set[int]()
+        """Accelerometers of which there are samples."""
         self._boots, self._shift = Boots(), 0.0
         self._held: list[Sample] = []
 
@@ -89,6 +91,11 @@ class Flown:
         """Time on the ground, s."""
         return self.recorded.standing_s
 
+    @property
+    def refused(self) -> Mapping[str, int]:
+        """Fixes that were refused, by reason, where GPS was never trusted; else empty."""
+        return self.recorded.refused
+
     def feed(self, sample: Sample) -> object:
         """Keep a sample, but not of other accelerometers.
 
@@ -97,6 +104,8 @@ class Flown:
         """
         if isinstance(sample, VehicleState) and sample.kind:
             self.kind = sample.kind
+        if isinstance(sample, ImuSample):
+            self.heard.add(sample.imu)
         if not isinstance(sample, ImuSample):
             self._held.append(sample)
         elif sample.imu == self.imu and impossible(sample) is None:
@@ -245,6 +254,9 @@ class FlownRecording:
     @property
     def without_flight(self) -> str:
         """Why nothing can be said of it where there is no flight to ask about."""
+        vehicle = self.source.vehicle
+        if vehicle.lacking:
+            return f"{NO_FLIGHT}: there is {vehicle.lacking}; {vehicle.to_do(self.diagnosis.imu)}"
         table = any(r.kind == "table" for r in self.source.recordings)
         return without_flight(standing=bool(self.grounded), table=table)
 
@@ -262,19 +274,26 @@ def flown(
 ) -> FlownRecording:
     """Read a recording and ask its sensor level.
 
+    Args:
+        path: the file, or opened already.
+        imu: which accelerometer; the first that there is if None.
+        progress: told the share of the reading that is done.
+
     Raises:
         RecordingError: a file that cannot be used.
     """
     wanted = imu or 1
     collected = Flown(wanted, airborne=isinstance(path, Recording) and path.airborne)
     source = read([path], collected, imu=imu, progress=progress)
+    if imu is None and collected.heard and wanted not in collected.heard:
+        return flown(path, imu=min(collected.heard), progress=progress)
     derived = any(r.derived for r in source.recordings)
-    there = wanted in collected.imus
-    if there and not derived:
+    known = wanted in collected.imus
+    if known and not derived:
         diagnosis = collected.answer(wanted).diagnosis
     else:
         diagnosis = unanswered(source.vehicle.unanswered(wanted)).diagnosis
-    batches = collected.recorded.sampled(wanted) if there else ()
+    batches = collected.recorded.sampled(wanted) if known else ()
     return FlownRecording(
         source,
         diagnosis,

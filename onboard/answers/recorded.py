@@ -77,6 +77,12 @@ class Recorded:
         return self.calibrator.standing_s
 
     @property
+    def refused(self) -> Mapping[str, int]:
+        """Fixes that were refused, by reason, where GPS was never trusted; else empty."""
+        trust = self.calibrator.trust
+        return {} if trust.trusted_s > 0.0 else trust.rejected
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """The autopilot's parameters as they were reported last, by name."""
         return self.calibrator.parameters.values

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from onboard.answers.same_flight import Track
+from onboard.answers.words import DISTRUST
 from onboard.core.estimate.result import Calibration, Coverage
+from onboard.core.gps.distrust import Distrust
 from onboard.core.inputs.assembly import mean_step
 from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.boot_time import Boots
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
-from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, ParameterValue
+from onboard.core.inputs.samples import (
+    FIX_3D,
+    AttitudeSample,
+    GpsFix,
+    ImuSample,
+    ParameterValue,
+)
 from onboard.core.maths.accelerometer import SixParameters, parameter_names
 from onboard.core.maths.arrays import Array, Vector3
 from onboard.errors import RecordingError
@@ -21,6 +30,8 @@ from onboard.recordings.recording import Recording
 
 TIMES_LOOKED_AT = 1000
 """Of a stream, that tell how fast it is: the mean step is known to a thousandth [cost]."""
+RECORD = "record it at 25 Hz or more, with attitude and GPS"
+OF_THE_EKF = (Distrust.EKF_GPS_GLITCH.value, Distrust.EKF_UNHEALTHY.value)
 DEVICE_IDS = {parameter_names(imu).device_id: imu for imu in (1, 2, 3, 4, 5)}
 
 
@@ -30,9 +41,11 @@ class Vehicle:
     def __init__(self) -> None:
         self._samples: Counter[int] = Counter()
         self._first_times: defaultdict[int, list[float]] = defaultdict(list)
-        self._fixes = self._placed = 0
+        self._fixes = self._placed = self._attitudes = 0
         self.standing_s = 0.0
         """Time on the ground, s."""
+        self.refused: Mapping[str, int] = {}
+        """Fixes that were refused, by reason, where GPS was never trusted; else empty."""
         self._parameters: dict[str, float] = {}
         self._device: dict[int, tuple[np.float32, Recording]] = {}
         self._tracks: dict[tuple[int, int], Track] = {}
@@ -57,11 +70,14 @@ class Vehicle:
             for columns in sample.imus:
                 self._count(columns.imu, columns.t)
                 self._hear(columns.t)
+            self._attitudes += len(sample.attitude.t)
             for other in sample.others:
                 self.check(other, recording)
         elif isinstance(sample, ImuSample):
             self._count(sample.imu, (sample.t,))
             self._hear((sample.t,))
+        elif isinstance(sample, AttitudeSample):
+            self._attitudes += 1
         elif isinstance(sample, GpsFix):
             self._fixes += 1
             self._follow(sample, recording)
@@ -134,14 +150,33 @@ class Vehicle:
         samples = f"accelerometer {imu}: {self._samples[imu]} samples"
         if self._slow(imu):
             return f"{samples}, fewer than {SLOWEST_IMU_HZ:g} a second; 25 are good"
-        if not self._placed:
-            return f"{samples}, and {'no fix of the GPS receiver' if self._fixes else 'no GPS'}"
+        if lacking := self.lacking:
+            return f"{samples}, and {lacking}"
         if self.standing_s > 0.0:
             return (
                 f"{samples}, none of them in the air with trusted GPS; "
                 f"the {self.standing_s:.0f} s on the ground are not used"
             )
         return f"{samples}, never together with attitude and trusted GPS"
+
+    @property
+    def lacking(self) -> str:
+        """What there is none of, without which no accelerometer can be asked; empty if nothing."""
+        if not self._attitudes:
+            return "no attitude"
+        if not self._fixes:
+            return "no GPS"
+        if not self._placed:
+            return "no fix of the GPS receiver"
+        if not self.refused:
+            return ""
+        reason = self._reason()
+        said = DISTRUST.get(reason, reason.replace("_", " "))
+        return f"no fix that can be trusted ({said}, {self.refused[reason]} fixes)"
+
+    def _reason(self) -> str:
+        """Why most fixes were refused."""
+        return max(self.refused, key=lambda name: self.refused[name])
 
     def _slow(self, imu: int) -> bool:
         return SLOWEST_IMU_HZ * mean_step(np.array(self._first_times[imu])) > 1.0
@@ -150,18 +185,28 @@ class Vehicle:
         """What to say of an accelerometer of which the estimator could make nothing."""
         names = parameter_names(imu)
         in_force = SixParameters(self._three(names.scale, 1.0), self._three(names.offset, 0.0))
-        return Calibration.unanswered(
+        empty = Calibration.unanswered(
             imu,
             in_force,
             self.silence(imu),
             parameters_known=all(name in self._parameters for name in names.six),
-            coverage=Coverage(0.0, (0.0,) * 6, "", self._to_do(imu)),
+            coverage=Coverage(0.0, (0.0,) * 6, "", self.to_do(imu)),
         )
+        return replace(empty, rejected=dict(self.refused))
 
-    def _to_do(self, imu: int) -> str:
-        if self.standing_s > 0.0 and not self._slow(imu):
-            return "fly: fast, with hard braking and turns both ways"
-        return "record it at 25 Hz or more, with attitude and GPS"
+    def to_do(self, imu: int) -> str:
+        """What would give an accelerometer an answer."""
+        if self._slow(imu) or not self._attitudes or not self._fixes:
+            return RECORD
+        if not self._placed:
+            return "take off when the GPS receiver has a 3D fix, under an open sky"
+        if self.refused:
+            if self._reason() in OF_THE_EKF:
+                return "see to what the autopilot's EKF complains of, and fly again"
+            return "see to the GPS receiver (sky, antenna, interference), and fly again"
+        if self.standing_s > 0.0:
+            return "fly fast, with hard braking and turns both ways"
+        return RECORD
 
     def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
         x, y, z = (self._parameters.get(name, default) for name in names)

@@ -57,6 +57,15 @@ class Gatherer(Protocol):
         """Take samples; None, and none is taken, if they are to be fed one by one."""
 
 
+@runtime_checkable
+class Judging(Protocol):
+    """A reader that judges fixes."""
+
+    @property
+    def refused(self) -> Mapping[str, int]:
+        """Fixes that were refused, by reason, where GPS was never trusted; else empty."""
+
+
 class Estimator(Reader, Protocol):
     """What replay needs of a recording, or of several (:mod:`onboard.answers.flights`)."""
 
@@ -251,6 +260,8 @@ def read(
         refuse_one_flight_twice(vehicle.tracks)
     reader.finish()
     vehicle.standing_s = reader.standing_s
+    if isinstance(reader, Judging):
+        vehicle.refused = reader.refused
     if progress is not None:
         progress(1.0)
     if imu is not None and imu not in vehicle.imus:

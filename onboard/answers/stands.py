@@ -14,6 +14,8 @@ from onboard.core.inputs.samples import FIX_3D, GpsFix, Sample, VehicleState
 from onboard.core.maths.arrays import Mask
 from onboard.core.vehicle.limits import MARGIN_S
 
+NO_FLIGHT = "no stretch of flight with trusted GPS, attitude and inertial data"
+
 
 def fixes_of(samples: Sequence[Sample]) -> list[GpsFix]:
     """Fixes in three dimensions, each once, of the receiver that has the most of them.
@@ -65,11 +67,11 @@ def with_landings(samples: list[Sample], grounded: list[tuple[float, float]]) ->
 
 def without_flight(*, standing: bool, table: bool) -> str:
     """Why there is no flight to ask about: what was taken for the ground, if anything was."""
-    why = "no stretch of flight with trusted GPS, attitude and inertial data"
     if not standing:
-        return why
-    why += (
-        f": where it stood, or was still within {GROUND_M:.0f} m of that height, is none, nor are "
-        f"{MARGIN_S:.0f} s to either side"
+        return f"{NO_FLIGHT} that is long enough"
+    why = (
+        f"{NO_FLIGHT}: where it stood, or was still within {GROUND_M:.0f} m of that height, is "
+        f"none, nor are {MARGIN_S:.0f} s to either side"
     )
-    return f"{why}; airborne = true in the map takes all of it for flight" if table else why
+    what = "airborne = true in the map takes all of it for flight" if table else "fly above that"
+    return f"{why}; {what}"

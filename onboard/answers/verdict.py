@@ -255,7 +255,16 @@ def _sentence(cure: str, settings: str) -> str:
 
 def to_fly(diagnosis: Diagnosis) -> list[str]:
     """What this flight did not show, each with what to fly: sentences."""
-    return [s for s in _sentences(diagnosis.note) if ":" in s and not diagnosis.split]
+    if diagnosis.split:  # which is the note
+        return []
+    if _unasked(diagnosis):
+        return [f"{capital(diagnosis.calibration.coverage.advice)}."]
+    return [s for s in _sentences(diagnosis.note) if ":" in s]
+
+
+def _unasked(diagnosis: Diagnosis) -> bool:
+    """Whether there was no flight to ask: the note says what there was, the coverage what to do."""
+    return not len(diagnosis.series.t) and bool(diagnosis.calibration.coverage.advice)
 
 
 def remarks(diagnosis: Diagnosis) -> list[str]:
@@ -263,7 +272,8 @@ def remarks(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.split:  # which is the note
         return []
     above = (*SAID_ABOVE, *(capital(c.words) for c in diagnosis.inconstant))
-    out = [s for s in _sentences(diagnosis.note) if ":" not in s and not s.startswith(above)]
+    every = [s for s in _sentences(diagnosis.note) if ":" not in s or _unasked(diagnosis)]
+    out = [s for s in every if not s.startswith(above)]
     return out + unused_in_words(diagnosis)
 
 

@@ -70,8 +70,8 @@ def open_dataflash(path: Path) -> Recording:
     damage = damage_notes(index.damaged_places, index.skipped_bytes, index.cut_off_bytes)
     if not np.isin(index.slots, imu_slots).any():
         raise RecordingError(
-            f"{path}: a DataFlash log without inertial records (IMU) that have a time"
-            f"{because_of(damage)}"
+            f"{path}: a DataFlash log without inertial records (IMU) that have a time; "
+            f"fly with IMU in LOG_BITMASK{because_of(damage)}"
         )
     t = _times(index, imu_slots)
     with np.errstate(all="ignore"):  # damaged bytes make any number

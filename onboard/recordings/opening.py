@@ -39,9 +39,10 @@ def kind_of(path: Path) -> str:
     Raises:
         RecordingError: no such file, not a file, or none of these.
     """
+    if path.is_dir():
+        raise RecordingError(f"{path}: is a directory; onboard fleet takes all that is in it")
     if path.exists() and not path.is_file():
-        what = "a directory" if path.is_dir() else "not a regular file"
-        raise RecordingError(f"{path}: is {what}; a recording is a file that can be read twice")
+        raise RecordingError(f"{path}: is no regular file; a recording has to be read twice")
     try:
         with path.open("rb") as file:
             head = file.read(HEAD_LENGTH)
@@ -50,7 +51,7 @@ def kind_of(path: Path) -> str:
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
     if not head:
-        raise RecordingError(f"{path}: is empty")
+        raise RecordingError(f"{path}: is empty; copy it again, or take another flight's")
     if is_ulog(head):
         return "ulog"
     if is_dataflash(head):

@@ -198,8 +198,8 @@ def _choose(
     flying = {s: v for s, v in vehicles.items() if v.imu_messages}
     if not flying:
         raise RecordingError(
-            f"{path}: no inertial messages (RAW_IMU, HIGHRES_IMU, SCALED_IMU2) in it"
-            f"{because_of(damage)}"
+            f"{path}: no inertial messages (RAW_IMU, HIGHRES_IMU, SCALED_IMU2) in it; "
+            f"set SRn_RAW_SENS to 25 or more while it is recorded{because_of(damage)}"
         )
     ranked = sorted(
         flying,

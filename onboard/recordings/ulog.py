@@ -93,7 +93,10 @@ def open_ulog(path: Path) -> Recording:
     inertial = [s for s in streams if s.convert in (sensor_combined, vehicle_acceleration)]
     if not inertial:
         why = because_of(damage_of(index))
-        raise RecordingError(f"{path}: a PX4 log without accelerometer data (sensor_combined){why}")
+        raise RecordingError(
+            f"{path}: a PX4 log without accelerometer data (sensor_combined); "
+            f"log the default topics{why}"
+        )
 
     def read() -> Iterator[Sample]:
         yield from _parameters(index)

@@ -123,7 +123,8 @@ def replay_text(result: Replay, file: str | Path) -> str:
     advice = [its for its in result.advice if its is not None]
     if not advice:
         raise UsageError(
-            f"{file}: {result.recordings[0].path} is no ArduPilot's, and no ULog of PX4"
+            f"{file}: {result.recordings[0].path} is no ArduPilot's, and no ULog of PX4; "
+            "the table and --json have the numbers"
         )
     names = [recording.path.name for recording in result.recordings]
     return calibration_text(result.answers, advice, names, qgc=is_qgc(str(file)))
@@ -140,7 +141,10 @@ def explanation_text(result: Explanation, file: str | Path) -> str:
         its = px4_advice(result.answer, recordings[0].path, result.parameters)
         return px4_text([result.answer], [its], result.files)
     if result.advice is None:
-        raise UsageError(f"{file}: {recordings[0].path} is no ArduPilot's, and no ULog of PX4")
+        raise UsageError(
+            f"{file}: {recordings[0].path} is no ArduPilot's, and no ULog of PX4; "
+            "the table and --json have the numbers"
+        )
     qgc = is_qgc(str(file))
     return parameter_text(result.diagnosis, result.advice, result.files, qgc=qgc)
 
