@@ -7,14 +7,18 @@ import logging
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from onboard.errors import OnboardError
+
 INTERRUPTED = 130
 
 if TYPE_CHECKING:
+    from onboard.daemon.process.starts import Starts
     from onboard.daemon.setup.configuration import Configuration
 
 
@@ -80,18 +84,41 @@ def run(
         click.echo("configuration is valid")
         return
     _log(verbose=verbose)
+    from onboard.daemon.process.starts import Starts
     from onboard.daemon.process.turns import MeteredLoop
 
-    with asyncio.Runner(loop_factory=MeteredLoop) as runner:
-        stopped_by = runner.run(_serve(chosen))
+    starts = Starts.from_environment()
+    _wait(starts)
+    try:
+        with asyncio.Runner(loop_factory=MeteredLoop) as runner:
+            stopped_by = runner.run(_serve(chosen, starts))
+    except (OnboardError, KeyboardInterrupt):
+        starts.over()  # it has said why
+        raise
+    starts.over()
     if stopped_by is signal.SIGINT:
         click.get_current_context().exit(INTERRUPTED)
 
 
-async def _serve(configuration: Configuration) -> signal.Signals | None:
+def _wait(starts: Starts) -> None:
+    """After starts in a row that came to nothing, leave vehicle, disk and journal alone a while."""
+    from onboard.daemon.process.notify import Notifier
+
+    seconds = starts.begin()
+    if seconds <= 0.0:
+        return
+    said = f"the last {starts.failed} starts came to nothing: waiting {seconds:.0f} s"
+    logging.getLogger(__name__).warning(said)
+    Notifier.from_environment().send(STATUS=said)
+    time.sleep(seconds)
+
+
+async def _serve(configuration: Configuration, starts: Starts) -> signal.Signals | None:
+    from onboard.daemon.process.limits import SETTLED_S
     from onboard.daemon.process.service import Service
 
     service = Service(configuration)
+    asyncio.get_running_loop().call_later(SETTLED_S, starts.over)
     try:
         await service.run(handle_signals=True)
     except asyncio.CancelledError:

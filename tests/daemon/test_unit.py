@@ -55,3 +55,7 @@ def test_the_watchdog_and_the_timeouts_fit_the_service():
     farewell = limits.FINISH_PUSH_S + mqtt_limits.FAREWELL_S + limits.SAVE_S
     assert float(settings["TimeoutStopSec"]) >= farewell + 5.0
     assert settings["RestartPreventExitStatus"] == "2"
+    # What a start waits after others that came to nothing leaves time for the start itself.
+    assert float(settings["TimeoutStartSec"]) >= 2.0 * limits.LONGEST_WAIT_S
+    assert settings["RuntimeDirectory"] == "onboard"
+    assert settings["RuntimeDirectoryPreserve"] == "restart"

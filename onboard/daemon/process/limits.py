@@ -10,6 +10,14 @@ from typing import Final
 
 TICK_S: Final = 1.0
 """s between two rounds of judging, saving and telling [service: a thirtieth of WatchdogSec]."""
+SETTLED_S: Final = 60.0
+"""s after which a start has not come to nothing: what crashes later asks once a minute for what a
+start asks, which a link of 57600 baud bears [cost]."""
+STARTS_AT_ONCE: Final = 2
+"""Starts in a row that do not wait: the first, and the one after a crash in flight [use]."""
+LONGEST_WAIT_S: Final = 30.0
+"""s that a start waits at the most [service: half of TimeoutStartSec, the other half is for the
+start itself]."""
 FINISH_PUSH_S: Final = 8.0
 """s that a transaction under way gets at shutdown; then it stays open, to be resumed [service:
 with SAVE_S and the broker's farewell inside TimeoutStopSec]."""
