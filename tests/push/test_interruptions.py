@@ -29,6 +29,54 @@ def test_what_somebody_sets_between_our_look_and_our_write_is_told(world, number
     assert world.holds() == world.journal_says() == "old"
 
 
+class TestARebootOrASilenceWhenAllSixAreWritten:
+    """As README says: old values go back where it shows before all six are verified."""
+
+    def late(self, world, what):
+        """Let it happen when the last of the six has been read back, before they are verified."""
+        when_written(world, 6, lambda: world.at(world.now + 0.5 * limits.SETTLE_S, what))
+
+    def test_a_reboot_that_shows_before_they_are_verified_is_undone(self, world):
+        def reboot():
+            world.autopilot.reboot(world.now, silence=0.5)
+            world.feed(Rebooted())
+
+        self.late(world, reboot)
+        outcome = finish(world)
+        assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.REBOOTED)
+        assert world.holds() == world.journal_says() == "old"
+
+    def test_a_reboot_that_shows_later_leaves_what_was_stored(self, world):
+        self.late(world, lambda: world.autopilot.reboot(world.now, silence=0.5))
+        assert finish(world).result is Result.COMPLETED
+        world.audit()  # as after any boot that is noticed
+        assert world.holds() == world.journal_says() == "new"
+
+    def test_a_reboot_that_has_lost_some_is_undone_whenever_it_shows(self, world):
+        def reboot():
+            world.autopilot.stored["INS_ACCSCAL_Z"] = world.plan.before["INS_ACCSCAL_Z"]
+            world.autopilot.reboot(world.now, silence=0.5)
+
+        self.late(world, reboot)
+        outcome = finish(world)
+        assert (outcome.result, outcome.reason) == (Result.ROLLED_BACK, Reason.REVERTED)
+        assert world.holds() == world.journal_says() == "old"
+
+    @pytest.mark.parametrize("lost", [(), ("INS_ACCOFFS_X",)], ids=["all there", "one lost"])
+    def test_after_a_silence_it_is_finished_if_all_six_are_still_there(self, world, lost):
+        def cut():
+            for name in lost:
+                world.autopilot.stored[name] = world.plan.before[name]
+            world.autopilot.reboot(world.now, silence=30.0)
+            world.feed(LinkLost())
+
+        self.late(world, cut)
+        outcome = finish(world)
+        assert (outcome.result, outcome.open) == (Result.INTERRUPTED, True)
+        assert world.restart(wait=60.0) == 1
+        assert world.holds() == world.journal_says() == ("old" if lost else "new")
+
+
 @pytest.mark.parametrize("count", range(1, 7))
 class TestInTheMiddle:
     """Something happens just after write number ``count`` took effect."""
