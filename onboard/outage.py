@@ -53,11 +53,18 @@ class Outage:
         self._expected = begins
         return told
 
-    def failed(self, reason: str, now: float) -> bool:
-        """A try was in vain.  True if that is to be told."""
+    def failed(self, reason: str, now: float, *, refused: bool = False) -> bool:
+        """A try was in vain.  True if that is to be told.
+
+        Args:
+            reason: in a few words.
+            now: time, s.
+            refused: the other side answered, and does not want us: that is never the same trouble.
+        """
         self.tries += 1
         if self._expected:
-            self._told.add(reason)
+            if not refused:
+                self._told.add(reason)
             self._expected = False
         return self._begin(reason, now)
 

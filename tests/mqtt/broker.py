@@ -29,11 +29,12 @@ class Broker:
         self.credentials = credentials or {}
         self._file = directory / "mosquitto.conf"
         self._log = directory / "mosquitto.log"
+        forgets = () if "persistence true" in lines else ("persistence false",)
         who = () if lines else ("allow_anonymous true",)
         if os.getuid() == 0:
             who = ("user root", *who)  # else it changes its user and cannot read a test's files
         self._file.write_text(
-            "\n".join((f"listener {self.port} 127.0.0.1", "persistence false", *who, *lines, ""))
+            "\n".join((f"listener {self.port} 127.0.0.1", *forgets, *who, *lines, ""))
         )
         self._process = None
 
@@ -59,11 +60,11 @@ class Broker:
                     return
                 await asyncio.sleep(0.02)
 
-    async def stop(self):
-        """Without a farewell, as when power goes; it forgets everything."""
+    async def stop(self, *, orderly=False):
+        """As when power goes: without a farewell, and it forgets everything; or as it is told."""
         if self._process is not None:
             with contextlib.suppress(ProcessLookupError):
-                self._process.kill()
+                self._process.terminate() if orderly else self._process.kill()
             await self._process.wait()
             self._process = None
 

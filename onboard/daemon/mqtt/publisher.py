@@ -44,6 +44,7 @@ library.setLevel(logging.CRITICAL)
 
 ONLINE, OFFLINE = b"online", b"offline"
 HUNG_UP = "the connection was lost"
+REFUSES = "it refuses: "
 _LOST = (
     "Disconnected during message iteration",
     "The client is not currently connected.",
@@ -323,8 +324,11 @@ class Publisher:
             self._hang_ups.absent()
         elif reason == HUNG_UP:
             reason = self._hung_up()
-        happened = self._outage.lost if self.connected else self._outage.failed
-        told = happened(reason, self._clock())
+        now = self._clock()
+        if self.connected:
+            told = self._outage.lost(reason, now)
+        else:
+            told = self._outage.failed(reason, now, refused=reason.startswith(REFUSES))
         if told:
             text = f"broker {self._where}: {reason}; tried again until it answers"
             self._notices.post("mqtt_lost", text, warning=True)
@@ -356,14 +360,16 @@ class Publisher:
             return  # what comes and goes is told of once
         over = self._outage.over(now)
         if over is not None:
-            self._notices.post(
-                "mqtt_connected", f"broker {self._where}: publishing again after {over}"
-            )
+            text = f"broker {self._where}: publishing again after {over}"
+            lost, self._outbox.dropped = self._outbox.dropped, 0
+            if lost:
+                text += f", without the oldest {lost} of its events"
+            self._notices.post("mqtt_connected", text)
 
 
 def _reason(error: Exception) -> str:
     """Why there is no connection, in a few words."""
     text = _CODES.sub("", str(error) or type(error).__name__)
     if isinstance(error, aiomqtt.exceptions.MqttConnectError):
-        return f"it refuses: {text}"
+        return f"{REFUSES}{text}"
     return HUNG_UP if text in _LOST else text
