@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,7 +13,7 @@ from onboard.answers import match_story as story
 from onboard.answers import words
 from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
-from onboard.answers.match_words import headline, title, wind_sentence
+from onboard.answers.match_words import TITLES, headline, title, wind_sentence
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.vehicle.records import Compared, Curve, Difference, VehicleMatch
 from onboard.report import match_charts
@@ -76,7 +77,7 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         hand_back=_hand_back(match, FRAME_BY[base]),
         frame_by=FRAME_BY[base],
         settings_by=SETTINGS_BY[base],
-        note=f"{words.capital(v.note)}." if v.note else "",
+        note=_note(v.note),
         effects=[_card(d, v) for d in match.effects],
         forces=_forces(v),
         alone_s=words.fixed(float(v.alone.t[-1]), 0) if v.alone is not None else "",
@@ -102,6 +103,14 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         fly=() if refused else _to_fly(match),
         not_testable=[(words.capital(title(n.name)), story.reason(n)) for n in match.not_testable],
     )
+
+
+def _note(said: str) -> str:
+    """The note as a sentence, with effects as people call them, where that is another word."""
+    for name in TITLES:
+        if "_" in name:
+            said = re.sub(rf"\b{name}\b", title(name), said)
+    return f"{words.capital(said)}." if said else ""
 
 
 def _against(match: Match) -> str:

@@ -44,13 +44,13 @@ def rms(x: Array) -> float:
 
 
 def most_shown(s: ForceSeries) -> float:
-    """How far errors of the force are drawn, m/s^2: nearly all of them.
+    """How far errors of the force are drawn, m/s^2: nearly all of each axis, before and after.
 
     One scale for all axes: where nothing differs, nothing should seem to.
     """
-    errors = np.abs(np.concatenate([s.measured - s.before, s.measured - s.after]))
-    errors = errors[np.isfinite(errors)]
-    return 1.1 * float(np.percentile(errors, 99.7)) or 1.0 if errors.size else 1.0
+    errors = np.abs(np.concatenate([s.measured - s.before, s.measured - s.after], axis=1))
+    finite = [e[np.isfinite(e)] for e in errors.T]
+    return 1.1 * max((float(np.percentile(e, 99.7)) for e in finite if e.size), default=0.0) or 1.0
 
 
 def of_forces(v: VehicleMatch, marks: list[Band]) -> list[Markup]:

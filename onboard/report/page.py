@@ -6,6 +6,7 @@ answer at the top of that document, for a place that shows results among others,
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 from typing import Final
 
@@ -18,6 +19,16 @@ PAGE: Final = "page.html.j2"
 HEAD: Final = "head.html.j2"
 SCRIPT: Final = "report.js"
 STYLES: Final = {PAGE: "report.css", HEAD: "head.css"}
+
+
+_PARTED: Final = re.compile(r"(?<=\d) (?=[%±])|(?<=±) (?=\d)")
+
+
+def unparted(shown: object) -> object:
+    """Words in which no line ends between a number and its per cent or its sigma."""
+    if isinstance(shown, str) and not isinstance(shown, Markup):
+        return _PARTED.sub("\u00a0", shown)
+    return shown
 
 
 def render(template: str, base: str = PAGE, **shown: object) -> str:
@@ -36,6 +47,7 @@ def render(template: str, base: str = PAGE, **shown: object) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        finalize=unparted,
     )
     layout = resources.files("onboard.report").joinpath(STYLES[base]).read_text(encoding="utf-8")
     common = look() if base == PAGE else ""  # it is for a document of its own

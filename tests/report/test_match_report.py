@@ -15,8 +15,15 @@ from onboard.answers import words
 from onboard.answers.match_document import match_document
 from onboard.answers.match_words import named
 from onboard.core.diagnosis.records import Verdict
-from onboard.core.vehicle.records import Compared, Difference, VehicleMatch, WindEstimate
+from onboard.core.vehicle.records import (
+    Compared,
+    Difference,
+    ForceSeries,
+    VehicleMatch,
+    WindEstimate,
+)
 from onboard.report.match import match_html
+from onboard.report.match_charts import most_shown
 from onboard.report.page import HEAD
 from tests.report.html_page import Page
 from tests.report.matches_by_hand import ROTORS, WIND, by_hand
@@ -173,3 +180,38 @@ def test_what_a_flight_does_not_tell_apart_is_said_in_headline_and_sentence():
     assert story.sentence(thrust).endswith("; or it is drag: this flight does not tell which.")
     assert "or it is" not in story.sentence(replace(thrust, rivals=()))
     assert named(replace(thrust, level="sensor")) == "thrust by mass"
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("axes", [1, 3])
+def test_an_axis_that_alone_is_far_off_is_drawn_all_but_its_rarest_moments(axis, axes):
+    """Nearly all of *all* errors would cut the peaks of one axis among three, before and after."""
+    rng = np.random.default_rng(5)
+    before = rng.normal(0.0, 0.01, (1000, axes))
+    axis %= axes
+    before[:, axis] = rng.normal(0.0, 3.0, 1000)
+    still = np.zeros((1000, axes))
+    series = ForceSeries(np.arange(1000.0), ("x", "y", "z")[:axes], still, before, still)
+    cut = np.abs(before[:, axis]) > most_shown(series)
+    assert cut.mean() <= 0.003
+
+
+def test_nothing_measured_has_a_scale_all_the_same():
+    nothing = np.full((4, 3), nan)
+    series = ForceSeries(np.arange(4.0), ("x", "y", "z"), nothing, nothing, nothing)
+    assert most_shown(series) == 1.0
+
+
+def test_no_line_ends_between_a_number_and_its_sigma_or_per_cent():
+    html = match_html(by_hand())
+    text = re.sub(r"<(style|script|svg).*?</\1>", "", html, flags=re.DOTALL)
+    assert "\u00a0±\u00a0" in text
+    assert "\u00a0%" in text
+    assert not re.search(r"\d [±%]|± \d", text)
+
+
+def test_effects_in_the_note_have_their_names_of_the_cards():
+    note = "thrust_scale and lift would explain a part of what is left"
+    said = page(note=note).words
+    assert "Thrust by mass and lift would explain" in said
+    assert "thrust_scale and" not in said
