@@ -72,6 +72,7 @@ def flown(
     missing="",
     status=Status.CALIBRATED,
     in_force=None,
+    known=True,
     asked=(),
 ):
     """A recording of 200 s with one accelerometer; ``seed`` adds noise of the claimed sigmas."""
@@ -79,7 +80,7 @@ def flown(
     noise = np.zeros(6) if rng is None else SIGMA * rng.standard_normal(6)
     value = np.asarray(six) + noise
     late = delay + (0.0 if rng is None else 0.005 * rng.standard_normal())
-    c = replace(calibration(value, delay=late, status=status), trusted_s=trusted)
+    c = replace(calibration(value, delay=late, status=status, known=known), trusted_s=trusted)
     if in_force is not None:
         c = replace(c, in_force_scale=tuple(in_force[:3]), in_force_offset=tuple(in_force[3:]))
     path = Path(folder) / name

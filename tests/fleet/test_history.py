@@ -72,6 +72,17 @@ def test_why_no_flight_has_calibrated_a_vehicle_is_said():
     assert drifting in said
 
 
+def test_a_vehicle_of_which_nobody_knows_what_is_in_force_is_not_well():
+    """It was told that there is nothing to do, whatever the flight had found."""
+    untold = flown("a.BIN", TRUE, known=False)
+    h = history([untold])
+    assert severity_of(h) is Severity.UNKNOWN
+    (said,) = sentences(h)
+    assert "does not say which parameters were in force" in said
+    told = flown("b.BIN", TRUE, day=1.0)
+    assert severity_of(history([untold, told])) is Severity.WELL
+
+
 def test_nothing_is_said_of_vehicles_on_which_nothing_happened():
     """All numbers of a vehicle together have one false alarm in a hundred."""
     said = sum(bool(sentences(history(season(8, seed=s)))) for s in range(60))

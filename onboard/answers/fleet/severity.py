@@ -22,6 +22,7 @@ NAMES = {
     "antenna_z_m": "antenna down",
 }
 """Numbers that are not of an accelerometer, in words."""
+PX4 = "px4"
 UNITS = {"1": "", "m/s^2": " m/s²", "s": " s", "m": " m"}
 
 
@@ -47,7 +48,7 @@ SAID = {
     Severity.CONTRADICTED: "flights contradict each other, or have no valid result",
     Severity.CHANGED: "a number has changed",
     Severity.TO_SET: "a flight asks for other parameters than are in force",
-    Severity.UNKNOWN: "no flight has calibrated it",
+    Severity.UNKNOWN: "no flight says whether what is in force is right",
     Severity.WELL: "nothing to do",
 }
 
@@ -69,8 +70,17 @@ def severity_of(h: History) -> Severity:
         return Severity.CHANGED
     if any(_asking(h)):
         return Severity.TO_SET
-    statuses = {i.calibration.status for f in h.vehicle.counting for i in f.record.imus}
-    return Severity.WELL if Status.CALIBRATED in statuses else Severity.UNKNOWN
+    answered = any(_answers(f, i) for f in h.vehicle.counting for i in f.record.imus)
+    return Severity.WELL if answered else Severity.UNKNOWN
+
+
+def _answers(flight: Flight, i: ImuRecord) -> bool:
+    """Whether a flight says that what is in force is right, or how far it is off.
+
+    PX4 has other parameters, which are never compared.
+    """
+    told = i.calibration.parameters_known or flight.record.document.recording.autopilot == PX4
+    return told and i.calibration.status is Status.CALIBRATED
 
 
 def sentences(h: History) -> tuple[str, ...]:
@@ -108,6 +118,8 @@ def why_not(i: ImuRecord) -> str:
     """Why a recording has not calibrated an accelerometer, in a sentence."""
     if i.missing:
         return f"something is missing from the model: {i.missing}"
+    if i.calibration.status is Status.CALIBRATED and not i.calibration.parameters_known:
+        return "the recording does not say which parameters were in force"
     said = i.calibration.note.removeprefix(f"accelerometer {i.calibration.imu}: ").rstrip(".")
     return said or "the flight does not show enough"
 
