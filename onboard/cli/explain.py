@@ -114,7 +114,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
     to_do = "To fly" if refused and not d.split else "To do"
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
-    table.add_column()
+    table.add_column(overflow="fold")
     found = verdict.missing(d)
     if d.effects and not refused:
         found = [f"{said[:-1]} ({named(e)})." for said, e in zip(found, d.effects, strict=False)]
@@ -145,7 +145,7 @@ def _limits(d: Diagnosis) -> Iterator[RenderableType]:
     """What this flight could not show."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
-    table.add_column()
+    table.add_column(overflow="fold")
     for k, a in enumerate(d.ambiguous):
         apart = f"{' / '.join(title_of(n) for n in a.names)}. To tell: {a.tell_apart}."
         table.add_row("" if k else "Not told apart", _plain(apart))

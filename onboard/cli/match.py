@@ -181,7 +181,7 @@ def flown_again_table(verified: FlownAgain) -> Table:
     """The simulator's flights beside the recording."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
-    table.add_column()
+    table.add_column(overflow="fold")
     said = "flies like the recording" if verified.agrees else "does not fly like the recording yet"
     table.add_row("Verified", f"the {verified.simulator} simulator {said}")
     for key, m in verified.mismatch.items():
@@ -215,7 +215,7 @@ def _facts(result: Match) -> Table:
     vehicle = result.vehicle
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
-    table.add_column()
+    table.add_column(overflow="fold")
     for k, d in enumerate(d for d in result.effects if d.name not in AIR):
         table.add_row("" if k else "In words", sentence(d))
     wind = wind_sentence(result)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from rich import box
 from rich.console import Group, RenderableType
 from rich.markup import escape
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
@@ -85,7 +86,7 @@ def _head(snapshot: Snapshot) -> Table:
     link = snapshot.link
     table = Table.grid(padding=(0, 1))
     table.add_column(style="bold", width=9)
-    table.add_column(max_width=70)
+    table.add_column(max_width=70, overflow="fold")
     table.add_row(
         "onboard", f"{snapshot.version}, {snapshot.phase}, up {duration(snapshot.uptime_s)}"
     )
@@ -137,19 +138,24 @@ def _imu(snapshot: Snapshot, imu: ImuView) -> RenderableType:
             NOT_SEEN.get(c.known[i], ""),
         )
     share = f"coverage {imu.coverage.percent:.0f} %"
-    parts: list[RenderableType] = [Text(), headline(imu, share), Text(f" {imu.state.sentence}")]
+    parts: list[RenderableType] = [Text(), headline(imu, share), _below(imu.state.sentence)]
     if imu.state.next:
-        parts.append(Text(f" next: {imu.state.next}"))
+        parts.append(_below(f"next: {imu.state.next}"))
     reasons = _held_back(snapshot, imu.imu)
     if len(reasons) > 1:
-        parts.append(Text(f" not written now: {'; '.join(reasons)}"))
+        parts.append(_below(f"not written now: {'; '.join(reasons)}"))
     parts.append(table)
     if change := residual(imu, None):
-        parts.append(Text(f" {change} (parameters in force -> estimate)"))
+        parts.append(_below(f"{change} (parameters in force -> estimate)"))
     written = last_push(snapshot, imu.imu)
     if written is not None:
         parts.append(_written(written))
     return Group(*parts)
+
+
+def _below(sentence: str, style: str = "") -> RenderableType:
+    """A sentence under a heading, with all of its lines indented."""
+    return Padding(Text(sentence, style=style), (0, 0, 0, 1), expand=False)
 
 
 def _held_back(snapshot: Snapshot, imu: int) -> list[str]:
@@ -159,7 +165,7 @@ def _held_back(snapshot: Snapshot, imu: int) -> list[str]:
 
 def _written(written: WrittenView) -> RenderableType:
     """What the last push has changed, and what it has brought."""
-    parts: list[RenderableType] = [Text(f" written {_moment(written.at)}:")]
+    parts: list[RenderableType] = [_below(f"written {_moment(written.at)}:")]
     if written.account is not None:
         parts += _told(written.account)
     parts.append(changes(written))
@@ -170,13 +176,13 @@ def _written(written: WrittenView) -> RenderableType:
     for what, before, after in rows:
         if before is not None and after is not None:
             unit = " m/s" if what.startswith("velocity") else " (1 is noise)"
-            parts.append(Text(f" {what} {before:.3g} before, {after:.3g} with these{unit}"))
+            parts.append(_below(f"{what} {before:.3g} before, {after:.3g} with these{unit}"))
     if written.verdict is None:
-        parts.append(Text(" the next flight has not judged it yet", style="dim"))
+        parts.append(_below("the next flight has not judged it yet", style="dim"))
     else:
         seen = written.next_velocity_rms_m_s
         found = "" if seen is None else f"; velocity residual {seen:.3g} m/s"
-        parts.append(Text(f" the flight after it: {written.verdict_sentence}{found}"))
+        parts.append(_below(f"the flight after it: {written.verdict_sentence}{found}"))
     return Group(*parts)
 
 
@@ -184,7 +190,7 @@ def _told(account: AccountView) -> list[RenderableType]:
     """What was wrong, what was written, what it improved, what to do next."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
-    table.add_column()
+    table.add_column(overflow="fold")
     for question, sentence in (
         (" was wrong", account.wrong),
         (" was written", account.written),
@@ -215,10 +221,12 @@ def _push(snapshot: Snapshot) -> RenderableType:
     text.append(f"policy {push.policy}, {push.state}", style="default")
     if push.approval_needed:
         text.append("; approve with `onboard approve`", style="bold yellow")
-    if push.last_outcome:
-        text.append(f"\n last: {push.last_outcome}", style="default")
     lines: list[RenderableType] = [text]
+    if push.last_outcome:
+        lines.append(_below(f"last: {push.last_outcome}"))
     table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
     for line in happened(snapshot)[-JOURNAL_LINES:]:
         table.add_row(f" {clock(line.at)}", line.text, style=_style(line))
     return Group(*lines, table)

@@ -196,7 +196,7 @@ def _timing(timing: dict[str, Estimate]) -> Iterator[str]:
 def _sentences(rows: Iterable[tuple[str, str]]) -> Table:
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="dim", no_wrap=True)
-    grid.add_column()
+    grid.add_column(overflow="fold")  # a file's name may be longer than a line
     last = None
     for label, text in rows:
         grid.add_row(label if label != last else "", Text(text))

@@ -93,3 +93,18 @@ def test_a_warning_is_among_what_has_happened_in_its_place_whatever_the_clock_wa
     console = Console(file=io.StringIO(), width=80)
     console.print(panel(snapshot))
     assert "the estimator has failed" in console.file.getvalue()
+
+
+def test_the_whole_status_fits_eighty_columns_and_what_is_below_a_heading_stays_below_it():
+    path = f"/var/lib/{'onboard-' * 12}journal.jsonl: No space left on device"
+    journal = (JournalLine(at=0.0, kind="closed", transaction="a", imu=1, text=path),)
+    push = msgspec.structs.replace(seen().push, last_outcome=LONG)
+    snapshot = msgspec.structs.replace(seen(imus=[wordy(1)]), journal=journal, push=push)
+    console = Console(file=io.StringIO(), width=80, height=24)
+    console.print(panel(snapshot))
+    shown = console.file.getvalue().splitlines()
+    assert max(map(cell_len, shown)) <= 80
+    assert not any("…" in line for line in shown)
+    assert path.replace(" ", "") in "".join("".join(shown).split())
+    below = shown[next(i for i, line in enumerate(shown) if line.startswith("IMU 1")) + 1 :]
+    assert {line[0] for line in below if line.strip() and not line.startswith("push")} == {" "}

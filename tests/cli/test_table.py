@@ -69,3 +69,14 @@ def test_file_names_are_not_markup(name):
     for part in replay_report(Replay((recording,), (unanswered(CALIBRATED),), {})):
         console.print(part)
     assert name in console.file.getvalue()
+
+
+def test_a_name_that_is_longer_than_a_line_is_told_to_its_end():
+    name = f"{'the-flight-of-monday-' * 5}end.tlog"
+    recording = Recording(Path(name), "tlog", "ardupilot", 1.0, {}, iter)
+    out = io.StringIO()
+    console = Console(file=out, width=80)
+    for part in replay_report(Replay((recording,), (unanswered(CALIBRATED),), {})):
+        console.print(part)
+    assert name in "".join(out.getvalue().split())
+    assert max(map(len, out.getvalue().splitlines())) <= 80
