@@ -206,7 +206,7 @@ class Vehicle:
             return "see to the GPS receiver (sky, antenna, interference), and fly again"
         if self.standing_s > 0.0:
             return "fly fast, with hard braking and turns both ways"
-        return RECORD
+        return "record the whole flight: inertial samples, attitude and GPS at one time"
 
     def _three(self, names: tuple[str, str, str], default: float) -> Vector3:
         x, y, z = (self._parameters.get(name, default) for name in names)
