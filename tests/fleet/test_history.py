@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -254,3 +256,15 @@ def test_what_a_flight_says_of_effects_is_kept_to_the_last_digit():
     for name in ("information", "vector", "prior", "moves"):
         np.testing.assert_array_equal(getattr(kept, name), getattr(said, name))
     assert "temperature" in kept.title
+
+
+def test_of_a_recording_that_shows_nothing_it_is_said_what_to_do():
+    blind = flown("a.BIN", TRUE, status=Status.INSUFFICIENT, trusted=0.0)
+    (imu,) = blind.record.imus
+    note, to_do = "accelerometer 1: 900 samples, and no attitude", "record it with attitude"
+    seen = replace(imu.calibration.coverage, advice=to_do)
+    c = replace(imu.calibration, note=note, coverage=seen)
+    of_struct = msgspec.structs.replace
+    record = of_struct(blind.record, imus=[of_struct(imu, calibration=c)])
+    h = history([replace(blind, record=record)])
+    assert sentences(h) == (f"accelerometer 1: 900 samples, and no attitude; {to_do}",)

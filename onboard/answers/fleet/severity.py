@@ -121,6 +121,8 @@ def why_not(i: ImuRecord) -> str:
     if i.calibration.status is Status.CALIBRATED and not i.calibration.parameters_known:
         return "the recording does not say which parameters were in force"
     said = i.calibration.note.removeprefix(f"accelerometer {i.calibration.imu}: ").rstrip(".")
+    if not i.calibration.trusted_s and (to_do := i.calibration.coverage.advice):
+        return "; ".join(filter(None, (said, to_do)))
     return said or "the flight does not show enough"
 
 
