@@ -184,7 +184,7 @@ def _sentences(c: Calibration, f: Figures, advice: Advice | None) -> tuple[str, 
     else:
         weak = f.seen.note if f.seen is not None else ""
         what = c.note.replace(weak, "").strip() or f"{knowledge(c)}."
-        what = what[0].upper() + what[1:]
+        what = f"{what[0].upper()}{what[1:].rstrip('.')}."
     sure = "Not judged on data that the fit did not see: there is too little."
     if math.isfinite(c.held_out_before) and math.isfinite(c.held_out_after):
         sure = (
@@ -214,6 +214,9 @@ def _to_do(c: Calibration, fly: str, advice: Advice | None) -> Iterator[str]:
     if not calibrated:
         if "onboard explain" in c.note:
             yield "Run onboard explain on the recording: it says what is missing."
+        if fly and not c.trusted_s:  # there was no flight to say anything of
+            yield f"{words.capital(fly)}."
+            return
         yield f"Fly again: {fly}." if fly else "Fly again, with turns, climbs and speed changes."
     elif not whole and fly:
         roughly = all(word in {YES, ROUGHLY} for word in seen(c))

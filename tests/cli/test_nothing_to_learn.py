@@ -15,6 +15,7 @@ from onboard.cli.main import run
 from sitl import recording
 from sitl.builtin.truth import ImuTruth
 from sitl.recording import FlightSpec
+from tests.report.html_page import Page
 
 FLOWN_S = 60.0
 INERTIAL = ("RAW_IMU", "SCALED_IMU2")
@@ -113,7 +114,10 @@ def test_it_is_said_what_is_missing_and_what_to_do(cut, tmp_path, capsys, verb):
     assert lacks in told
     assert to_do.lower() in told.lower()
     assert "insufficient" in file.read_text()
-    assert lacks in " ".join(page.read_text().replace("&#39;", "'").split())
+    shown = Page.of(page.read_text()).words
+    assert lacks in shown
+    assert to_do.lower() in shown.lower()
+    assert f"Fly again: {to_do}" not in shown
 
 
 def test_match_ends_with_one_line_that_says_it(cut, capsys):
