@@ -25,7 +25,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.comparison import Comparison, compare
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.mean_force import in_the_mean
-from onboard.core.estimate.result import Calibration, Status
+from onboard.core.estimate.result import Calibration, Coverage, Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.estimate.standing import Standing
 from onboard.core.inputs.blocks import Block
@@ -36,6 +36,7 @@ from onboard.core.maths.compiling import prefer_compiled
 PAUSE_S = 10.0
 """Between two recordings."""
 NO_FLIGHT = "no stretch of flight with trusted GPS and inertial data"
+SEE_TO_NUMBERS = "see to the recording's numbers: parameters, attitude and GPS are of no vehicle"
 KEEPING_ALL = CalibratorSettings(refine=False, at_once=False, buffer_s=math.inf)
 
 
@@ -182,9 +183,7 @@ class Recorded:
                 self._asked_of[imu] = asked_of(found.choice)
         except (ArithmeticError, LookupError, ValueError) as error:  # numbers that no model fits
             why = f"the flight could not be diagnosed ({error})"
-            plain = self.calibrator.calibration(imu)
-            note = f"{why}. {plain.note}".rstrip()
-            return unanswered(replace(plain, status=Status.INSUFFICIENT, note=note), why)
+            return unanswered(self._undiagnosed(imu, why), why)
         if len(self._recordings) > 1:
             apart = contradiction(found.engine, self._recordings)
             if apart is not None:
@@ -194,6 +193,21 @@ class Recorded:
         if self.chronicle is not None:
             self.chronicle.take(imu, found.engine, found.left_open)
         return given
+
+    def _undiagnosed(self, imu: int, why: str) -> Calibration:
+        """What is known where there is no diagnosis; what spoils that may spoil this, too."""
+        try:
+            plain = self.calibrator.calibration(imu)
+        except (ArithmeticError, ValueError):
+            parameters = self.calibrator.parameters
+            return Calibration.unanswered(
+                imu,
+                parameters.six(imu),
+                why,
+                parameters_known=parameters.known(imu),
+                coverage=Coverage(0.0, (0.0,) * 6, "", SEE_TO_NUMBERS),
+            )
+        return replace(plain, status=Status.INSUFFICIENT, note=f"{why}. {plain.note}".rstrip())
 
     def _with_rest(self, found: Diagnosis) -> Diagnosis:
         """With what the accelerometer reads at rest, which is no part of its estimate."""

@@ -10,6 +10,7 @@ import gc
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -181,6 +182,8 @@ def _forget_output() -> None:
 def main() -> None:
     """Entry point of the ``onboard`` command."""
     in_one_thread(os.environ)
+    # Numbers that no vehicle has are told of in a sentence; numpy's own are for programmers.
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
     status = run()
     gc.freeze()  # what ends with the process need not be looked through: 0.2 s after a flight
     leave(status)

@@ -179,3 +179,39 @@ def test_what_is_no_recording_of_a_flight_is_one_line(flight, tmp_path, capsys, 
 def test_a_directory_is_for_fleet(tmp_path, capsys, verb):
     assert run([verb, str(tmp_path)]) == 2
     assert "onboard fleet" in said(capsys)
+
+
+@pytest.mark.parametrize("verb", ["replay", "explain", "match"])
+def test_numbers_that_no_model_fits_end_in_a_sentence(flight, tmp_path, capsys, monkeypatch, verb):
+    """What spoils the diagnosis spoils what is known without it, too: it was a traceback."""
+
+    def spoilt(*_args, **_options):
+        raise ValueError("math domain error")
+
+    monkeypatch.setattr("onboard.answers.recorded.examine", spoilt)
+    monkeypatch.setattr("onboard.core.estimate.calibrator.Calibrator.calibration", spoilt)
+    path = tmp_path / "flight.tlog"
+    write(path, flight)
+    assert run([verb, str(path)]) == 0
+    if verb != "match":  # its vehicle is told all the same
+        told = said(capsys)
+        assert "could not be diagnosed (math domain error)" in told
+        assert "ee to the recording's numbers" in told
+
+
+@pytest.mark.parametrize("verb", ["replay", "explain", "match"])
+def test_an_antenna_a_thousand_kilometres_away_is_none(flight, tmp_path, verb):
+    path, file = tmp_path / "flight.tlog", tmp_path / "d.json"
+    far = [
+        (t, moved(m) if m.get_type() == "PARAM_VALUE" and "_POS" in m.param_id else m)
+        for t, m in flight
+    ]
+    write(path, far)
+    assert run([verb, str(path), "--json", str(file)]) == 0
+    assert "could not be diagnosed" not in file.read_text()
+
+
+def moved(parameter: mavlink.MAVLink_message) -> mavlink.MAVLink_message:
+    made = copy.copy(parameter)
+    made.param_value = 1e6
+    return made

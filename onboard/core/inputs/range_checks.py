@@ -28,8 +28,9 @@ LATEST_S = 1.0
 """s; between the arrival of a fix and its record: an autopilot that is five fixes behind flies by
 none of them [physics]."""
 MOST_PARAMETER = 1e30
-PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0))
-"""Part of a name that begins with INS or AHRS, and what its magnitude stays below by far."""
+PARAMETER_LIMITS = (("SCAL_", 10.0), ("OFFS_", 1000.0), ("AHRS_TRIM_", 10.0), ("POS", 1000.0))
+"""Part of a name that begins with INS, AHRS or GPS, and what its magnitude stays below by far:
+places of antennas and sensors, m, are within a vehicle [physics]."""
 ACCELEROMETERS = range(1, 6)
 
 
@@ -76,7 +77,7 @@ def impossible(sample: Sample) -> str | None:
             return "gps_impossible"
     elif isinstance(sample, ParameterValue):
         limit = MOST_PARAMETER
-        if sample.name.startswith(("INS", "AHRS")):
+        if sample.name.startswith(("INS", "AHRS", "GPS")):
             limit = next((most for part, most in PARAMETER_LIMITS if part in sample.name), limit)
         if not abs(sample.value) < limit:
             return "parameter_impossible"

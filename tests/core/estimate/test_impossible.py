@@ -61,6 +61,10 @@ def test_what_no_sensor_measures_is_refused_by_name(x):
         assert impossible(replace(sample, t=x)) is not None
     assert impossible(replace(SCALE, value=x)) == "parameter_impossible"
     assert impossible(replace(SCALE, value=20.0)) == "parameter_impossible"
+    for name in ("GPS1_POS_X", "GPS_POS1_Y", "INS_POS2_Z"):
+        assert impossible(replace(SCALE, name=name, value=x)) == "parameter_impossible"
+        assert impossible(replace(SCALE, name=name, value=-2000.0)) == "parameter_impossible"
+        assert impossible(replace(SCALE, name=name, value=-12.0)) is None
 
 
 def test_a_receiver_without_vertical_velocity_is_believed_horizontally():
