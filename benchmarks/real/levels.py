@@ -26,6 +26,8 @@ SHORT = {
     "height_walk": "hwk",
     "force_walk": "fwk",
     "lift_walk": "lwk",
+    "shaken_walk": "shk",
+    "shaken_lift": "shl",
     "tilt_walk": "gyro",
     "bias_walk": "bias",
     "attitude": "att",

@@ -19,10 +19,13 @@ from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.shaken import walk_s
 from onboard.core.inputs.expected_force import drowned, expected, spectrum, swung, tones, white
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
+from onboard.core.maths.arrays import Array
 from onboard.core.model.regressors import Family
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
@@ -148,7 +151,7 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
     That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
     that smooths: a span or an antenna may have been found for the sake of these very samples.
     """
-    if spikes.walk**2 < WALK_SHARE * np.max(full.noise.walk_b):
+    if spikes.walk**2 < WALK_SHARE * np.max(_walk_s(full.noise, spikes.batches)):
         return False
     plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
     told = []
@@ -227,9 +230,15 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
     if little and not drowned(batches, density):
         return sampled
-    noise = np.minimum(white(density), sampled.noise.walk_s(batches[0].segment.R_bs))
+    noise = np.minimum(white(density), _walk_s(sampled.noise, batches))
     felt = asked.examined(expected(batches, density, noise), sampled)
     return max(sampled, felt, key=lambda made: made.log_likelihood)
+
+
+def _walk_s(levels: NoiseLevels, batches: Sequence[Batch]) -> Array:
+    """(3,) variance by which the velocity walks in a second of all batches, (m/s)^2."""
+    out: Array = np.mean([walk_s(levels, batch.segment) for batch in batches], axis=0)
+    return out
 
 
 def since_reboot(batches: Sequence[Batch], since: float = -np.inf) -> list[Batch]:

@@ -28,6 +28,8 @@ WORDS: Final = {
     "jitter": GPS,
     "force_walk": FORCE,
     "lift_walk": FORCE,
+    "shaken_walk": FORCE,
+    "shaken_lift": FORCE,
     "tilt_walk": GYROSCOPE,
     "bias_walk": GYROSCOPE,
     "attitude": TILT,

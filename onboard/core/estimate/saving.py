@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import STATED, NoiseLevels
 from onboard.core.maths.arrays import Vector3, vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
@@ -112,7 +113,10 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
     )
     if not blocks:
         raise StateError("saved state is damaged: an accelerometer without sums")
-    levels = {"lift_walk": e["noise"]["force_walk"], **e["noise"]}  # one for all axes, once
+    # One walk for all axes, once, and as strong however much the flight was shaken.
+    calm = {name: LIMITS[name][0] for name in ("shaken_walk", "shaken_lift")}
+    once = {"lift_walk": e["noise"]["force_walk"], **calm}
+    levels = {**once, **e["noise"]}
     noise = NoiseLevels(**{k: _finite(v) for k, v in levels.items()})
     for name, level in asdict(noise).items():
         # Nothing goes with what a receiver states that tells nothing.

@@ -32,6 +32,7 @@ class Step:
         columns: (9, m + 1) stack of what the m unknowns add to velocity, height and attitude;
             nothing is known, column 0 is zero.
         missed: (6,) variances of what the samples miss: of velocity, (m/s)^2, and turn, rad^2.
+        shaken: (3,) variances of velocity if all that shakes the force were missed, (m/s)^2.
         stated: of the fix that it leads to, as in :class:`Epoch`.
     """
 
@@ -40,6 +41,7 @@ class Step:
     moved: Array
     columns: Array
     missed: Array
+    shaken: Array
     stated: float = 1.0
 
 
@@ -52,6 +54,7 @@ class Steps:
     moved: Array
     columns: Array
     missed: Array
+    shaken: Array
     stated: Array
 
     def __len__(self) -> int:
@@ -65,6 +68,7 @@ class Steps:
             self.moved[k],
             self.columns[k],
             self.missed[k],
+            self.shaken[k],
             float(self.stated[k]),
         )
 
@@ -76,6 +80,7 @@ def steps(
     mean_turn: Array,
     stack: Array,
     missed: Array,
+    shaken: Array,
     stated: Array,
 ) -> Steps:
     """K steps of prediction from their integrals.
@@ -88,6 +93,7 @@ def steps(
         stack: (K, 9, m + 1) both of these per unit of each of the m unknowns, and the turn that
             they add, rad per unit, behind a column of zeros: becomes the columns of the steps.
         missed: (K, 6) as in :class:`Step`.
+        shaken: (K, 3) see there.
         stated: (K,) see there.
     """
     # What turns at a steady rate meets the force on the mean in proportion to its time left.
@@ -96,7 +102,7 @@ def steps(
     gained, turned = stack[:, 0:3], stack[:, 6:9]
     np.subtract(arm @ turned, gained, out=gained)
     np.negative(turned, out=turned)
-    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed, stated)
+    return Steps(duration, np.ascontiguousarray(turn), moved, stack, missed, shaken, stated)
 
 
 @dataclass(frozen=True, slots=True)

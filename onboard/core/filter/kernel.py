@@ -5,8 +5,8 @@ Everything linear is carried in one array, the *carried* (B, STATES, C) of B mem
 * ``X`` (m + 1 columns): the state's mean at ``theta = 0``, then its regressors, so that the mean
   at ``theta`` is ``X @ (1, -theta)``;
 * ``P`` (STATES columns): its covariance;
-* none or three more matrices of STATES columns: the covariance that unit white noise on each body
-  axis of the accelerometer has given the state (:mod:`onboard.core.filter.regressor_noise`).
+* none or three more matrices of STATES columns: the covariance that the velocity's walk along each
+  body axis has given the state of member 0 (:mod:`onboard.core.filter.regressor_noise`).
 
 A transition multiplies all of them from the left by the same matrix, and an update adds to all of
 them the same gain times their own innovation; only the covariances are then multiplied from the
@@ -185,7 +185,8 @@ def predict(carried: Array, R_nb: Array, step: Step, process: Process) -> None:
         P[:, 0, V, V] += along_axes(R_nb, step.missed[:3])
         P[:, 0, PSI, PSI] += along_axes(R_nb, step.missed[3:])
     if P.shape[1] > 1:
-        P[:, 1:, :3, :3] += step.duration * R_nb.T[:, :, None] * R_nb.T[:, None, :]
+        walk = (process.before + process.after)[0, V]
+        P[:, 1:, :3, :3] += walk[:, None, None] * R_nb.T[:, :, None] * R_nb.T[:, None, :]
 
 
 def along_axes(R_nb: Array, var: Array) -> Array:

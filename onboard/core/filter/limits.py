@@ -112,6 +112,8 @@ LIMITS: Final[dict[str, tuple[float, float]]] = {
     "height_walk": (0.002, 2.0),
     "force_walk": (0.01, 3.0),
     "lift_walk": (0.01, 3.0),
+    "shaken_walk": (0.01, 10.0),
+    "shaken_lift": (0.01, 10.0),
     "tilt_walk": (5e-5, 0.03),
     "bias_walk": (1e-6, 3e-3),
     "attitude": (0.02, 0.3),
@@ -142,6 +144,9 @@ from fixes that are worth nothing [bound].
 Velocities down are as good as those north and east but for a factor of ten, and a heading that is
 off for longer than ten minutes is off for the flight [physics].
 
+Of what shakes a force no more is missed than if its samples had nothing to do with each other, and
+a hundredth of it is nothing beside the rest [physics].
+
 The slow error of the recorded attitude is no such formality.  Its floor is what EKF3 says of
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
 [physics].  The likelihood would have less, for it sees how smooth this error is, not how large:
@@ -171,6 +176,14 @@ SUDDEN: Final = 4.9
 """Sigmas of the misses of a segment past which a sample is no noise but something sudden
 [probability: 1e-6 of a Gaussian's; what noise is taken for it costs less than a third of its own
 random walk]."""
+
+# What is shaken (shaken).
+
+SHAKEN_MEAN_S: Final = 0.2
+"""s; what a force scatters by about its mean over so long is what shakes it: vehicles manoeuvre by
+half a second and more, rotors and gusts shake by a tenth and less [physics]."""
+SHAKEN_LASTS_S: Final = 1.0
+"""s; it is as strong for so long: a variance from fewer samples would be none [cost]."""
 
 # Noise in the regressors (regressor_noise).
 

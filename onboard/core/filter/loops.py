@@ -182,12 +182,12 @@ def predict(
             row, more = C[i], driven[i]
             for c in range(m1):
                 row[c] += more[c]
-    # Unit white noise of each body axis, where it is carried.
+    # What the walk along each body axis makes, where it is carried.
     for axis in range(count - 1):
-        at = m1 + (axis + 1) * STATES
+        at, walk = m1 + (axis + 1) * STATES, before[0, axis] + after[0, axis]
         for i in range(3):
             for j in range(3):
-                carried[0, i, at + j] += duration * R_nb[i, axis] * R_nb[j, axis]
+                carried[0, i, at + j] += walk * R_nb[i, axis] * R_nb[j, axis]
 
 
 @compiled(

@@ -68,6 +68,7 @@ def carry(
     moved: Array,
     columns: Array,
     missed: Array,
+    shaken: Array,
     latitude: float,
     theta: Array,
     walk: Array,
@@ -75,6 +76,7 @@ def carry(
     times: Array,
     heading_time: Array,
     powers: Array,
+    shares: Array,
     stated: float,
     gravity: float,
     earth: int,
@@ -107,6 +109,10 @@ def carry(
         swing[b, 2] = (1.0 - x) * shrunk
         for i in range(STATES):
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
+        for i in range(3):
+            more = 0.5 * shares[b, i] * shaken[i]
+            before[b, i] += more
+            after[b, i] += more
         as_stated = stated ** powers[b, 1]
         for i in range(MEASURED - 1):
             driven = settled[b, i] * (1.0 - decay[b, i] * decay[b, i])

@@ -35,6 +35,10 @@ class NoiseLevels:
             the body's x and y, m/s/sqrt(s).
         lift_walk: the same along its z.  Lift and thrust act along it: of what they are shaken by,
             turbulence and rotors, samples miss some.
+        shaken_walk: what else it walks by where the force is shaken: the share that samples miss of
+            how much they scatter about their mean (:mod:`onboard.core.filter.shaken`), along x and
+            y.
+        shaken_lift: the same along z.
         tilt_walk: angle random walk of the gyroscope, rad/sqrt(s).
         bias_walk: random walk of the gyroscope's bias, rad/s/sqrt(s).
         attitude: Gauss-Markov error of the recorded tilt (correlation time
@@ -59,6 +63,8 @@ class NoiseLevels:
     height_walk: float = 0.05
     force_walk: float = 0.04
     lift_walk: float = 0.04
+    shaken_walk: float = 0.1
+    shaken_lift: float = 0.1
     tilt_walk: float = 3e-4
     bias_walk: float = 3e-5
     attitude: float = 0.02
@@ -81,9 +87,14 @@ class NoiseLevels:
         """(3,) variance by which the velocity walks along body axes, (m/s)^2/s."""
         return np.array([self.force_walk, self.force_walk, self.lift_walk]) ** 2
 
-    def walk_s(self, R_bs: Array) -> Array:
-        """(3,) the same along the axes of a sensor that R_bs (3, 3) turns to the body's."""
-        out: Array = (R_bs**2).T @ self.walk_b
+    @property
+    def shaken_b(self) -> Array:
+        """(3,) share of what shakes the force along body axes that it walks by, squared."""
+        return np.array([self.shaken_walk, self.shaken_walk, self.shaken_lift]) ** 2
+
+    def walk_shaken(self, density_b: Array) -> Array:
+        """(3,) variance of the walk where ``density_b`` (3,) is how much it is shaken."""
+        out: Array = self.walk_b + self.shaken_b * density_b
         return out
 
     @property
@@ -143,6 +154,8 @@ ESTIMATED = (
     "height_walk",
     "force_walk",
     "lift_walk",
+    "shaken_walk",
+    "shaken_lift",
     "tilt_walk",
     "bias_walk",
     "attitude",

@@ -14,6 +14,7 @@ from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import noise_density
+from onboard.core.filter.shaken import walk_s
 from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
 from onboard.core.filter.uncertainty import Covariance, Information, Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
@@ -328,13 +329,13 @@ class Pass:
             return
         # What looks like noise sample by sample may be a tone that integrates to nothing; the
         # velocity's random walk, found from the residuals, is all that it can amount to.
-        walk = self.filter.bank[0].walk_s(segment.R_bs)
-        density = np.minimum(segment.once(noise_density), walk)
+        walk = walk_s(self.filter.bank[0], segment)
+        share = np.minimum(segment.once(noise_density) / walk, 1.0)
         at = self.model.slices["six"].start
         # The Gram is by body axes; the sensor's are permuted or mixed by R_bs.
         sensor = (segment.R_bs**2).T @ gram
         for j in range(3):
-            sums.G[at + j] = density[j] * sensor[j]
+            sums.G[at + j] = share[j] * sensor[j]
 
 
 def _first_believed(fixes: Fixes, trusted: NDArray[np.bool_]) -> int:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from onboard.core.filter.innovations import Epochs, Steps, steps
 from onboard.core.filter.limits import LONGEST_STEP_S, STAMP_JITTER_S, STATED_M_S
 from onboard.core.filter.missed import missed_between
+from onboard.core.filter.shaken import shaken_between
 from onboard.core.filter.state import MEASURED, PSI, H, V
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -83,8 +84,9 @@ def prepare(
     intervals = maker.intervals(start, end)
     near = around(maker, epoch_t, point.window, np.array(point.antenna), np.array(point.shapes))
     regressors = model.regressors(intervals, near)
+    unsure = missed_between(segment, start, end), shaken_between(segment, start, end)
     return Prepared(
-        _steps(intervals, regressors, missed_between(segment, start, end), stated[leads_to]),
+        _steps(intervals, regressors, unsure, stated[leads_to]),
         measured,
         _epochs(segment, fixes, trusted, stated, point, near, regressors),
     )
@@ -120,7 +122,10 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_], NDArray[
 
 
 def _steps(
-    intervals: Intervals, regressors: SegmentRegressors, missed: Array, stated: Array
+    intervals: Intervals,
+    regressors: SegmentRegressors,
+    unsure: tuple[Array, Array],
+    stated: Array,
 ) -> Steps:
     of = regressors.of_sensors
     return steps(
@@ -129,7 +134,7 @@ def _steps(
         of.force,
         of.axes[:, 0],
         regressors.gained,
-        missed,
+        *unsure,
         stated,
     )
 

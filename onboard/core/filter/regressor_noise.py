@@ -1,9 +1,11 @@
 """Accelerometer noise in the regressors: what of a regressor's information is not signal.
 
-The regressors of the scale are integrals of *noisy* accelerations (errors in variables).  Unit
-white noise on each axis is carried through the same integrals and the same whitening as the
-regressors are (:mod:`onboard.core.filter.kernel`); its square in the whitened innovations, times
-its density, is the expected part of the sums that is noise.
+The regressors of the scale are integrals of *noisy* accelerations (errors in variables).  What the
+velocity walks by along each axis is carried through the same integrals and the same whitening as
+the regressors are (:mod:`onboard.core.filter.kernel`), with its density where it is: noise that is
+strong in a gust counts little there, and is none in the calm after it, where a little counts much.
+Its square in the whitened innovations, times the share of it that samples show as noise, is the
+expected part of the sums that is noise.
 """
 
 from __future__ import annotations

@@ -110,10 +110,10 @@ def _note(
 
 @compiled(
     "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
-    " f8[:,:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:], f8[:,:,::1],"
-    " f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1],"
-    " f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], i8, f8[::1], f8, i8, i8,"
-    " f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
+    " f8[:,:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:],"
+    " f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1],"
+    " f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1],"
+    " i8, f8[::1], f8, i8, i8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
 )
 def run(
     carried: Array,
@@ -127,6 +127,7 @@ def run(
     moved: Array,
     columns: Array,
     missed: Array,
+    shaken: Array,
     leads_to: Array,
     latitude: Array,
     ends: Index,
@@ -146,6 +147,7 @@ def run(
     times: Array,
     heading_time: Array,
     powers: Array,
+    shares: Array,
     tails: Array,
     known: Array,
     form: int,
@@ -170,11 +172,12 @@ def run(
         most: epochs to take.
         symmetry: updates after which covariances are made symmetric.
         theta: (m,) estimate.
-        duration: (K,), turn, moved, columns and missed as in :class:`~..innovations.Steps`.
+        duration: (K,), turn, moved, columns, missed and shaken as in :class:`~..innovations.Steps`.
         turn: see there.
         moved: see there.
         columns: see there.
         missed: see there.
+        shaken: see there.
         leads_to: (K,) ``stated`` of the epoch that each step leads to.
         latitude: (n,) rad.
         ends: (K,) the epoch at the end of each step; -1: none.
@@ -196,6 +199,7 @@ def run(
         times: (2,) of the slow errors of velocity and tilt, s.
         heading_time: (B,) of that of the heading, s.
         powers: (B, 2) of ``stated`` with which the velocity's variances go.
+        shares: (B, 3) as ``shaken`` of :class:`~..variances.Variances`.
         tails: (4,) by degrees of freedom.
         known: (m, m) how well the estimate is known: by its covariance, or by its information.
         form: which of the two, as of :mod:`~..tail_loops`.
@@ -231,6 +235,7 @@ def run(
             moved[k],
             columns[k],
             missed[k],
+            shaken[k],
             latitude[max(e, 0)],
             theta,
             walk,
@@ -238,6 +243,7 @@ def run(
             times,
             heading_time,
             powers,
+            shares,
             leads_to[k],
             gravity,
             earth,

@@ -40,13 +40,23 @@ class Variances:
         settled: (B, MEASURED) of the slow errors, Gauss-Markov, of each measured number; its unit
             squared.
         reading: (B, MEASURED) of the white noise of each measured number, its unit squared.
+        shaken: (B, 3) shares of what shakes the force that are missed, squared, by body axes.
         jitter: (B,) of the moment that a velocity is of, s^2.
         heading_time: (B,) time of the heading's smooth error, s.
         stated: (B, 2) powers with which the velocity's variances, of white noise and of colour, go
             with the square of what the receiver states.
     """
 
-    __slots__ = ("_attitude", "heading_time", "jitter", "reading", "settled", "stated", "walk")
+    __slots__ = (
+        "_attitude",
+        "heading_time",
+        "jitter",
+        "reading",
+        "settled",
+        "shaken",
+        "stated",
+        "walk",
+    )
 
     def __init__(self, bank: Sequence[NoiseLevels], *, attitude: bool) -> None:
         """Take the noise levels of each member, and whether the attitude may err at all."""
@@ -55,6 +65,7 @@ class Variances:
         self.walk = np.zeros((B, STATES))
         self.settled = np.zeros((B, MEASURED))
         self.reading = np.zeros((B, MEASURED))
+        self.shaken = np.array([q.shaken_b for q in bank])
         self.jitter = np.array([q.jitter**2 for q in bank])
         self.heading_time = np.array([q.heading_time for q in bank])
         self.stated = np.array([(q.stated, q.stated_colour) for q in bank])
@@ -133,7 +144,9 @@ class Variances:
             P[:, i, c] = P[:, c, i] = -colour[:, i]
         return P
 
-    def over(self, duration: float, decay: Array, stated: float) -> tuple[Array, Array]:
+    def over(
+        self, duration: float, decay: Array, stated: float, shaken: Array
+    ) -> tuple[Array, Array]:
         """Process noise of a step, what acts before and what after its transition.
 
         A random walk acts along the step: half of it before, half after the transition, and so does
@@ -144,11 +157,13 @@ class Variances:
             duration: s.
             decay: (B, MEASURED) factors by which the slow errors have decayed.
             stated: as in :class:`~onboard.core.filter.innovations.Step`.
+            shaken: see there.
 
         Returns:
             Two arrays (B, STATES), unit of the state squared; the velocity's along body axes.
         """
         before = self.walk * (0.5 * duration)
+        before[:, V] += 0.5 * self.shaken * shaken
         after = before.copy()
         driven = self.settled * (1.0 - decay * decay)
         driven[:, V] *= self.times(stated)[:, 1:]

@@ -94,9 +94,10 @@ class WhiteningFilter:
         R_nb: (3, 3) attitude, body axes to NED.
         t: time on the boot clock, s.
         taken_t: of the last epoch of which something was taken, s.
-        noise_gram: (3,) sum since :meth:`begin_block` of the whitened noise of each body axis
-            squared, per unit density (:mod:`onboard.core.filter.regressor_noise`); None while
-            several levels are tried, for only the sums that count need it.
+        noise_gram: (3,) sum since :meth:`begin_block` of the squares of what the walk along each
+            body axis makes of the whitened innovations
+            (:mod:`onboard.core.filter.regressor_noise`); None while several levels are tried, for
+            only the sums that count need it.
     """
 
     def __init__(
@@ -198,7 +199,9 @@ class WhiteningFilter:
         decay = np.empty((len(self.bank), MEASURED))
         decay[:] = (cv, cv, cv, 1.0, tilt, tilt, 1.0)
         decay[:, -1], swing = moved(T, self.variances.heading_time)
-        process = Process(fall, decay, swing, *self.variances.over(T, decay, step.stated))
+        process = Process(
+            fall, decay, swing, *self.variances.over(T, decay, step.stated, step.shaken)
+        )
         self.kernel.predict(self.carried, R, step, process)
         R = R @ step.turn
         self.R_nb = R if turn_n is None else turn_by(-turn_n * T) @ R

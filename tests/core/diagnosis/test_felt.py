@@ -7,6 +7,7 @@ import pytest
 
 from onboard.core.diagnosis.cleared import cleared
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.filter.shaken import walk_s
 from onboard.core.inputs.expected_force import expected
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 from onboard.core.maths.frames import rotation_from_euler
@@ -22,10 +23,11 @@ SHAKE, NOTHING = np.full(3, 0.6), np.zeros(3)
 """Standard deviations of white shaking, body axes, m/s^2."""
 
 
-def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING):
+def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING, calm_s=0.0):
     """The flight with noise in its samples, and really shaken so that its receiver has it, too.
 
-    Beside both tones of 1.7 Hz: a beat in the samples, and a swing that is real.
+    Beside both tones of 1.7 Hz: a beat in the samples, and a swing that is real.  All of it by
+    turns with as long a calm.
     """
     rng, R_nb, v, made = np.random.default_rng(3), np.eye(3), np.zeros(3), []
     times, speeds, heights = [-np.inf], [v], [0.0]
@@ -35,8 +37,9 @@ def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING)
             R_nb = rotation_from_euler(s.roll, s.pitch, s.yaw)
         elif isinstance(s, ImuSample):
             tone = np.sqrt(2.0) * np.sin(2.0 * np.pi * 1.7 * s.t)
-            a = real * rng.normal(size=3) + swing * tone
-            n = noise * rng.normal(size=3) + beat * tone
+            calm = calm_s > 0.0 and s.t // calm_s % 2
+            a = (real * rng.normal(size=3) + swing * tone) * (not calm)
+            n = (noise * rng.normal(size=3) + beat * tone) * (not calm)
             out = replace(s, f_b=tuple((np.array(s.f_b) + a + n).tolist()))
             v = v + STEP * (R_nb @ a)
             times.append(s.t)
@@ -63,7 +66,8 @@ def changed_and_walk(samples):
     sampled = made.engine(1).batches
     full = cleared(made, made.engine(1), sampled, Origin(made.first_sample)).full
     taken = [a.segment.raw_s - b.segment.raw_s for a, b in zip(full.batches, sampled, strict=True)]
-    return np.sqrt(np.mean(np.concatenate(taken) ** 2, axis=0)), full.noise.walk_b
+    walk = np.mean([walk_s(full.noise, batch.segment) for batch in sampled], axis=0)
+    return np.sqrt(np.mean(np.concatenate(taken) ** 2, axis=0)), walk
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +93,24 @@ def test_of_what_is_really_shaken_no_more_is_noise_than_the_velocity_walks_by(fl
     taken = changed(shaken(flight, noise=noise, real=real))
     assert np.all(taken[:2] > 0.5 * noise[:2])
     assert taken[2] < 0.15 * real[2]
+
+
+@pytest.mark.slow
+def test_the_velocity_walks_where_the_samples_are_noisy_and_not_where_it_is_shaken(flight):
+    """In gusts of noise samples miss all of what they scatter by; of real ones next to nothing."""
+    noisy, real = (
+        fed(shaken(flight, calm_s=7.0, **kind), Calibrator()).engine(1).noise
+        for kind in ({"noise": SHAKE}, {"real": SHAKE})
+    )
+    gust = SHAKE[0] ** 2 * STEP
+    for share, calm in (
+        (noisy.shaken_walk, noisy.force_walk),
+        (noisy.shaken_lift, noisy.lift_walk),
+    ):
+        assert share**2 * gust + calm**2 == pytest.approx(gust, rel=0.5)
+        assert calm**2 < share**2 * gust  # twice as much in gusts: a short flight tells no more
+    for share, calm in ((real.shaken_walk, real.force_walk), (real.shaken_lift, real.lift_walk)):
+        assert share**2 * gust + calm**2 < 0.1 * gust
 
 
 @pytest.mark.slow

@@ -49,7 +49,8 @@ def step_of(rng, m):
     integrals = [0.3 * rng.normal(size=(1, *s)) for s in shapes]
     integrals[-1][:, :, 0] = 0.0
     missed, stated = rng.uniform(0.0, 0.1, size=(1, 6)), rng.uniform(0.1, 10.0, size=1)
-    return steps(np.array([0.2]), *integrals, missed, stated)[0]
+    shaken = rng.uniform(0.0, 0.1, size=(1, 3))
+    return steps(np.array([0.2]), *integrals, missed, shaken, stated)[0]
 
 
 def process_of(rng, members):
@@ -100,7 +101,8 @@ def test_a_step_is_the_transition_of_every_matrix(who, seed, bank, m):
     grown = np.zeros_like(P)
     if bank[1]:
         for axis in range(3):
-            grown[0, 1 + axis, :3, :3] = step.duration * np.outer(R[:, axis], R[:, axis])
+            walk = process.before[0, axis] + process.after[0, axis]
+            grown[0, 1 + axis, :3, :3] = walk * np.outer(R[:, axis], R[:, axis])
     P = P.copy()
     P[:, 0] += first
     P = F[:, None] @ P @ np.swapaxes(F, -1, -2)[:, None] + grown

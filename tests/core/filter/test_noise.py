@@ -15,7 +15,6 @@ from onboard.core.filter.noise import (
     neighbours,
 )
 from onboard.core.filter.noise_step import bounded, scoring_step
-from onboard.core.maths.frames import rotation_from_vector
 
 CENTRE = USUAL
 STIFF = 1e4
@@ -224,15 +223,6 @@ def test_the_mean_of_an_error_that_is_forgotten_varies_as_its_correlation_says(l
     expected = 0.3**2 * 2.0 * float(((1.0 - apart) * np.exp(-apart * lasts / 20.0)).mean())
     assert levels.mean_heading_variance(lasts) == pytest.approx(expected, rel=1e-3)
     assert levels.mean_heading_variance(0.0) == pytest.approx(0.3**2)
-
-
-def test_a_walk_along_a_sensors_axes_is_the_bodys_as_it_is_mounted():
-    levels = replace(USUAL, force_walk=0.1, lift_walk=0.3)
-    x_down = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    np.testing.assert_allclose(levels.walk_s(np.eye(3)), [0.01, 0.01, 0.09])
-    np.testing.assert_allclose(levels.walk_s(x_down), [0.09, 0.01, 0.01])
-    tilted = rotation_from_vector(np.array([0.3, -0.8, 0.5]))
-    assert levels.walk_s(tilted).sum() == pytest.approx(0.11)
 
 
 def test_a_heading_that_seems_worse_than_usual_is_found_anew():

@@ -47,9 +47,24 @@ def test_levels_are_of_what_is_usually_stated():
             one.of_reading(NOTHING, NOTHING, stated), other.of_reading(NOTHING, NOTHING, stated)
         )
         decay = np.full((1, MEASURED), 0.9)
-        np.testing.assert_allclose(one.over(0.2, decay, stated), other.over(0.2, decay, stated))
+        driven = [made.over(0.2, decay, stated, np.zeros(3)) for made in (one, other)]
+        np.testing.assert_allclose(*driven)
         for made in (one, other):
             starts = made.at_start(0.1, 0.1, stated, down=True, height=True)
             np.testing.assert_allclose(
                 starts, one.at_start(0.1, 0.1, stated, down=True, height=True)
             )
+
+
+def test_what_is_shaken_walks_like_all_else_but_only_there():
+    """A walk that is the same all along is the share of a shaking that is the same all along."""
+    density, T, decay = np.array([0.4, 0.1, 2.0]), 0.2, np.full((1, MEASURED), 0.9)
+    levels = NoiseLevels(shaken_walk=0.3, shaken_lift=0.6)
+    calm, shaken = (
+        Variances((levels,), attitude=True).over(T, decay, 1.0, x)
+        for x in (np.zeros(3), T * density)
+    )
+    more = np.array([0.3, 0.3, 0.6]) ** 2 * density * T
+    np.testing.assert_allclose(sum(shaken)[0, V] - sum(calm)[0, V], more)
+    np.testing.assert_allclose(sum(shaken)[0, V], levels.walk_shaken(density) * T)
+    np.testing.assert_array_equal(shaken[0][0, V.stop :], calm[0][0, V.stop :])

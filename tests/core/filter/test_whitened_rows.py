@@ -161,6 +161,8 @@ LEVELS = NoiseLevels(
     height_walk=0.1,
     force_walk=0.05,
     lift_walk=0.12,
+    shaken_walk=0.8,
+    shaken_lift=0.5,
     tilt_walk=1e-3,
     bias_walk=1e-4,
     attitude=0.01,
@@ -178,6 +180,8 @@ ACCELERATION = np.array([0.0, 4.0, 0.0])
 DT, SUB = 0.01, 10
 BLOW_EVERY, BLOW_SIGMA = 7, np.array([0.2, 0.1, 0.3, 0.02, 0.01, 0.03])
 """Steps; and what their samples miss: m/s and rad, body axes."""
+GUST_STEPS, GUST = 20, np.array([0.01, 0.03, 0.2])
+"""Steps that it lasts, by turns with as many without; (m/s^2)^2 s, body axes."""
 START_SIGMA = 0.02
 
 
@@ -229,6 +233,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
     out = []
     for k in range(epochs):
         P, force, to_end, mean = np.eye(3), np.zeros(3), np.zeros(3), np.zeros((3, 3))
+        gust = GUST * (k // GUST_STEPS % 2)
         for i in range(SUB):
             t = k * T + (i + 0.5) * DT
             w = np.array([0.5 * np.sin(t), 0.3 * np.cos(0.7 * t), 0.4])
@@ -239,7 +244,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
             v = v + a * DT
             R = R @ rotation_from_vector(w * DT)
             w_read = w + bias + levels.tilt_walk * normal(size=3) / np.sqrt(DT)
-            f_read = f + np.sqrt(levels.walk_b / DT) * normal(size=3)
+            f_read = f + np.sqrt(levels.walk_shaken(gust) / DT) * normal(size=3)
             middle = P @ rotation_from_vector(w_read * DT / 2)
             force, mean = force + middle @ f_read * DT, mean + middle * DT
             to_end = to_end + (T - (i + 0.5) * DT) * (middle @ f_read) * DT
@@ -262,7 +267,7 @@ def rows_of_its_own_model(seed, epochs, levels=LEVELS):
         R = R @ P.T @ rotation_from_vector(missed[3:] * normal(size=3)) @ P
         both = np.stack([force, to_end])
         stack = np.stack([np.zeros(9), np.concatenate([*both, np.zeros(3)])], axis=1)
-        integrals = (P, both, mean, stack, missed**2)
+        integrals = (P, both, mean, stack, missed**2, T * gust)
         leads_to = np.array([stated(k + 1)])
         step = steps(np.array([T]), *(x[None] for x in integrals), leads_to)[0]
         filter_.predict(step, theta, 0.0)
