@@ -8,6 +8,7 @@ import pytest
 
 from onboard.cli.run import _serve
 from onboard.daemon.process.service import Service
+from onboard.daemon.process.starts import Starts
 from onboard.daemon.setup.configuration import from_mapping
 from tests.daemon.daemons import until
 
@@ -26,7 +27,7 @@ async def test_it_leaves_what_was_under_way_and_frees_everything(
         await asyncio.Event().wait()
 
     monkeypatch.setattr(Service, "_finish_push", unfinished)
-    serving = asyncio.create_task(_serve(from_mapping(document, source="test")))
+    serving = asyncio.create_task(_serve(from_mapping(document, source="test"), Starts(None)))
     await until(lambda: serving.done() or signal.getsignal(first) is not signal.SIG_DFL)
     await asyncio.sleep(0.2)
     os.kill(os.getpid(), first)
