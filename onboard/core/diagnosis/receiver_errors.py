@@ -34,7 +34,7 @@ from onboard.core.diagnosis.stepped import known_without
 from onboard.core.diagnosis.tiles import UNGATED, D, Tile, Tiled
 from onboard.core.estimate.calibration_model import calibration_model
 from onboard.core.estimate.going_through import through
-from onboard.core.filter.limits import ANYTHING, GATE_VELOCITY
+from onboard.core.filter.limits import ANYTHING, GATE_VELOCITY, RECEIVER_M_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
 from onboard.core.inputs.segments import Batch
@@ -93,8 +93,8 @@ class Looking:
             found = self._chosen([x.tile for x in seen], np.array([x.off for x in seen]))
             left = self._left(found)
         told = (self._told(x, left) for x in found if self._lasts(x, left))
-        # Where a receiver is so noisy that it may be nothing, there is no error to be told.
-        return tuple(x for x in told if x.size**2 > needed(1) * x.sigma**2)
+        # What it is unsure by, and what a good receiver errs by now and then, is no error to tell.
+        return tuple(x for x in told if x.size**2 > needed(1) * (x.sigma**2 + RECEIVER_M_S**2))
 
     def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
         """When velocities jump, s: a tile for each fix about some moments, the flight between."""

@@ -57,6 +57,17 @@ def test_a_small_error_that_is_taken_back_is_told_by_its_likelihood(vehicle, see
 
 
 @pytest.mark.slow
+def test_what_good_receivers_err_by_now_and_then_is_no_error_to_be_told():
+    """However quiet this one is else, and however clearly it is seen."""
+    fault = concealed.GpsFault(start=60.0, end=74.0, north=-0.26, east=0.2)
+    said, _ = told("copter", 4721, fault)
+    assert said.effects == ()
+    c, (truth, *_) = said.calibration, random_imus(4721)
+    off = np.array([*c.scale, *c.offset]) - [*truth.scale, *truth.offset]
+    assert np.all(np.abs(off) < 3.5 * np.array([*c.scale_sigma, *c.offset_sigma]))
+
+
+@pytest.mark.slow
 def test_what_comes_after_a_long_fault_is_not_its_size():
     """The EKF goes on complaining when the receiver is right again, as one does that was lost."""
     fault = concealed.GpsFault(start=60.0, end=110.0, north=-0.4, east=-2.4)
