@@ -15,7 +15,7 @@ def compiled(request):
     if request.param and compiled_loops() is None:
         pytest.skip("loops are not compiled here")
     yield request.param
-    prefer_compiled(yes=False)
+    prefer_compiled()
 
 
 def drawn(rng, n):
