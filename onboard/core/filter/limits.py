@@ -144,8 +144,9 @@ from fixes that are worth nothing [bound].
 Velocities down are as good as those north and east but for a factor of ten, and a heading that is
 off for longer than ten minutes is off for the flight [physics].
 
-Of what shakes a force no more is missed than if its samples had nothing to do with each other, and
-a hundredth of it is nothing beside the rest [physics].
+Samples that have nothing to do with each other miss all of what shakes a force, and a hundredth of
+it is nothing beside the rest [physics].  With it goes what else shaking does to a velocity (a mount
+that gives, an antenna that swings), but not ten times as much [bound].
 
 The slow error of the recorded attitude is no such formality.  Its floor is what EKF3 says of
 itself: it starts with an accelerometer bias known to 0.2 m/s^2, which at level is a tilt of 20 mrad
