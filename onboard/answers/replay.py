@@ -264,13 +264,17 @@ def read(
         vehicle.refused = reader.refused
     if progress is not None:
         progress(1.0)
-    if imu is not None and imu not in vehicle.imus:
-        there = ", ".join(map(str, vehicle.imus))
-        raise UsageError(f"no accelerometer {imu} in {recordings[0].path} (there: {there})")
+    _refuse_absent(imu, vehicle, recordings[0])
     # Of those that were opened here nothing is read again: of a day's flight, places are much.
     given = [isinstance(p, Recording) for p in paths]
     kept = (r if mine else r.closed() for r, mine in zip(recordings, given, strict=True))
     return Reading(tuple(kept), vehicle)
+
+
+def _refuse_absent(imu: int | None, vehicle: Vehicle, recording: Recording) -> None:
+    if imu is not None and imu not in vehicle.imus:
+        there = ", ".join(map(str, vehicle.imus))
+        raise UsageError(f"no accelerometer {imu} in {recording.path} (there: {there})")
 
 
 def _refuse_mixture(recordings: Sequence[Recording]) -> None:

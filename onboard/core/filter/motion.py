@@ -60,6 +60,28 @@ def angle_of(R_attitude: Array, R_nb: Array, turned: Array) -> None:
 
 
 @part
+def _drive(
+    before: Array,
+    after: Array,
+    shares: Array,
+    shaken: Array,
+    settled: Array,
+    decay: Array,
+    as_stated: float,
+) -> None:
+    """Add to a member's walks, before and after a step, as ``Variances.over``: all but them."""
+    for i in range(3):
+        more = 0.5 * shares[i] * shaken[i]
+        before[i] += more
+        after[i] += more
+    for i in range(MEASURED - 1):
+        driven = settled[i] * (1.0 - decay[i] * decay[i])
+        if i < 3:
+            driven *= as_stated
+        after[ERRORS + i] += driven
+
+
+@part
 def carry(
     carried: Array,
     R_nb: Array,
@@ -109,16 +131,7 @@ def carry(
         swing[b, 2] = (1.0 - x) * shrunk
         for i in range(STATES):
             before[b, i] = after[b, i] = 0.5 * T * walk[b, i]
-        for i in range(3):
-            more = 0.5 * shares[b, i] * shaken[i]
-            before[b, i] += more
-            after[b, i] += more
-        as_stated = stated ** powers[b, 1]
-        for i in range(MEASURED - 1):
-            driven = settled[b, i] * (1.0 - decay[b, i] * decay[b, i])
-            if i < 3:
-                driven *= as_stated
-            after[b, ERRORS + i] += driven
+        _drive(before[b], after[b], shares[b], shaken, settled[b], decay[b], stated ** powers[b, 1])
     predict(carried, R_nb, T, moved, columns, missed, fall, decay, swing, before, after)
     for i in range(3):
         a, b_, c_ = R_nb[i, 0], R_nb[i, 1], R_nb[i, 2]
