@@ -20,13 +20,13 @@ from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.limits import LONGEST_WINDOW_S
 from onboard.core.estimate.mean_force import in_the_mean
 from onboard.core.estimate.result import Calibration
 from onboard.core.estimate.solution import Solution
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import STATED
 from onboard.core.filter.traces import EpochState
+from onboard.core.inputs.reach import NEAR
 from onboard.core.inputs.samples import FIX_3D, GpsFix, ImuSample, Sample
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
@@ -159,7 +159,7 @@ class Fit:
     @property
     def clipped(self) -> bool:
         """Whether the averaging span is at its limit."""
-        return self.window >= LONGEST_WINDOW_S * (1.0 - AT_LIMIT)
+        return self.window >= NEAR.longest_window * (1.0 - AT_LIMIT)
 
 
 def fit(flight: RealFlight, imu: int) -> Fit:

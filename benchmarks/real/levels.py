@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.real.command import fit_and_show
 from benchmarks.real.flights import Fit
 from benchmarks.real.whiteness import KINDS
-from onboard.core.estimate.limits import LONGEST_WINDOW_S
+from onboard.core.inputs.reach import NEAR
 
 SANE_GYROSCOPE = 1e-3
 """rad/sqrt(s); ten times a poor MEMS gyroscope: more is something else."""
@@ -75,7 +75,7 @@ def run(made: Sequence[Fit]) -> list[Share]:
             f"variance inflation below {SANE_INFLATION:g} of the six numbers",
             lambda f: f.numbers_inflation < SANE_INFLATION,
         ),
-        share(f"averaging span clipped at {LONGEST_WINDOW_S:g} s", lambda f: f.clipped),
+        share(f"averaging span clipped at {NEAR.longest_window:g} s", lambda f: f.clipped),
         share("calibrated", lambda f: f.status == "calibrated"),
         share(
             "calibrated, of those that moved",

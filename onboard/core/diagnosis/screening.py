@@ -22,11 +22,11 @@ from onboard.core.diagnosis.refusals import OPINIONS, Refused, refused, within
 from onboard.core.diagnosis.score import surprise
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
-from onboard.core.estimate.limits import DELAY_RANGE_S
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.traces import residual
 from onboard.core.gps.distrust import Distrust
+from onboard.core.inputs.limits import DELAY_RANGE_S
 from onboard.core.inputs.segments import Batch
 from onboard.core.model.ekf_misled import EkfMisled
 from onboard.core.physics.finding import Finding

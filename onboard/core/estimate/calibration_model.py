@@ -10,16 +10,15 @@ import numpy as np
 from onboard.core.estimate.limits import (
     ATTITUDE_DELAY_RANGE_S,
     BEYOND,
-    DELAY_RANGE_S,
     HEADING_RANGE_RAD,
-    LONGEST_WINDOW_S,
     SHAPE_RANGE,
     SHORTER,
 )
 from onboard.core.estimate.observability import Needs
+from onboard.core.inputs.limits import DELAY_RANGE_S
+from onboard.core.inputs.reach import FAR, reach_of
 from onboard.core.maths.arrays import Array, vector3, vector4
 from onboard.core.maths.bounded import bounded
-from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.ekf_sensors import EkfSensors
 from onboard.core.model.gyro_scale import GyroScale
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
@@ -77,7 +76,7 @@ def possible(
     estimate: tuple[Array, Array],
     wanders: float = 0.0,
     *,
-    shaped: bool = True,
+    apart: float = 0.0,
 ) -> Array:
     """The likeliest unknowns with which the linearisation stays within what is possible.
 
@@ -86,15 +85,18 @@ def possible(
         model: its model.
         estimate: (m,) unknowns, and (m, m) covariance.
         wanders: variance of the mean of what the heading is off by for a while, rad^2.
-        shaped: whether shapes of a receiver's response may move.
+        apart: from one fix to the next, s.
     """
+    reach = reach_of(apart)
     low, high = np.full(model.size, -math.inf), np.full(model.size, math.inf)
     ranges = (
         (point.delay, *DELAY_RANGE_S),
-        (point.window**2, 0.0, LONGEST_WINDOW_S**2),
+        (point.window**2, 0.0, reach.longest_window**2),
         (point.attitude_delay, *ATTITUDE_DELAY_RANGE_S),
         (point.heading, *HEADING_RANGE_RAD),
-        *zip(point.shapes, *(SHAPE_RANGE if shaped else 2 * (point.shapes,)), strict=True),
+        *zip(
+            point.shapes, *(SHAPE_RANGE if reach.tells(apart) else 2 * (point.shapes,)), strict=True
+        ),
     )
     for name, (now, least, most) in zip(MOVING, ranges, strict=True):
         low[model.index[name]], high[model.index[name]] = least - now, most - now
@@ -142,7 +144,7 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
         scale=vector3(theta[0:3]),
         beta=vector3(theta[3:6]),
         delay=float(np.clip(point.delay + theta[i["gps_delay"]], *DELAY_RANGE_S)),
-        window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, LONGEST_WINDOW_S)),
+        window=float(np.clip(np.sqrt(max(0.0, square)), 0.0, FAR.longest_window)),
         attitude_delay=float(
             np.clip(point.attitude_delay + theta[i["attitude_delay"]], *ATTITUDE_DELAY_RANGE_S)
         ),
@@ -171,7 +173,7 @@ def beyond_range(
     theta: Array,
     covariance: Array,
     *,
-    shaped: bool = True,
+    apart: float = 0.0,
     step: float = math.inf,
 ) -> list[str]:
     """What would have to be further off than it is looked for, by :data:`BEYOND` of its sigmas.
@@ -186,19 +188,21 @@ def beyond_range(
         model: its model.
         theta: (m,) estimate.
         covariance: (m, m) of it.
-        shaped: whether the linearisation follows the shape of the receiver's averaging.
+        apart: from one fix to the next, s; where fixes have no neighbours within what is looked
+            around them, the shape of the receiver's averaging is not followed.
         step: between inertial samples, s; infinite where nobody knows it any more.
 
     Returns:
         In words; empty if all is where the flight wants it.
     """
+    reach = reach_of(apart)
     ranges = (
         ("the latency of GPS", "gps_delay", point.delay, DELAY_RANGE_S),
         (
             "the receiver's averaging",
             "window_squared",
             point.window**2,
-            (least_square(step), LONGEST_WINDOW_S**2),
+            (least_square(step), reach.longest_window**2),
         ),
         (
             "the lateness of the attitude",
@@ -214,11 +218,11 @@ def beyond_range(
         low = -math.inf if name in free else least
         i = model.index[name]
         asked, sigma = taken + theta[i], math.sqrt(covariance[i, i])
-        longer = name == "window_squared" and asked + SHORTER * sigma > AROUND_SPAN_S**2
+        longer = name == "window_squared" and asked + SHORTER * sigma > reach.around**2
         if asked < low - BEYOND * sigma or asked > high + BEYOND * sigma:
             out.append(f"{words} would have to be further off than can be told")
-        elif longer and not shaped:
-            out.append(f"so few fixes may be averages over more than {AROUND_SPAN_S:.1f} s")
+        elif longer and not reach.tells(apart):
+            out.append(f"so few fixes may be averages over more than {reach.around:.1f} s")
     return out + [
         f"{name} would have to be the other way round than it can be"
         for name in reversed_of(model, model.families, theta, covariance)

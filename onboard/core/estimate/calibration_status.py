@@ -21,6 +21,7 @@ from onboard.core.estimate.observability import Needs
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.solution import Solution
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.reach import FAR, NEAR
 
 HOVERED = "hovering or standing: fly fast, brake hard, turn both ways"
 """What to do about a flight that went nowhere."""
@@ -67,11 +68,12 @@ def doubt_of(engine: Engine, solution: Solution) -> str:
 def too_far(engine: Engine, solution: Solution) -> list[str]:
     """What the flight wants further off than anything of it can be, in words."""
     found = solution.theta, solution.covariance
-    # Sums of earlier flights alone have followed what their fixes showed.
-    shaped = engine.shaped or not engine.batches
+    # Sums of earlier flights alone have followed what their fixes showed: long spans, slow ones.
+    slow = engine.point.window > NEAR.longest_window
+    apart = engine.apart if engine.batches else FAR.around if slow else NEAR.around
     steps = [float(np.median(np.diff(b.segment.t))) for b in engine.batches]
     step = float(np.median(steps)) if steps else math.inf
-    return beyond_range(engine.point, engine.model, *found, shaped=shaped, step=step)
+    return beyond_range(engine.point, engine.model, *found, apart=apart, step=step)
 
 
 def good_enough(made: Calibration, needs: Needs) -> bool:

@@ -39,13 +39,13 @@ from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
 from onboard.core.filter.whitening import Uses
+from onboard.core.inputs.reach import reach_of
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, Seconds, merged
 from onboard.core.maths.medians import middle
 from onboard.core.model import autopilot_attitude
-from onboard.core.model.around import AROUND_SPAN_S
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.model.regressors import Family, Model
 
@@ -150,7 +150,9 @@ class Engine(Watched):
     def about_point(self, theta: Array) -> Array:
         """``theta`` of an older linearisation as unknowns about the present one."""
         out = theta.copy()
-        kept = () if self.shaped else SHAPES
+        # Of fixes further apart than is looked around them, shares of what is an epoch apart stand
+        # for something else: they are not followed.
+        kept = () if reach_of(self.apart).tells(self.apart) else SHAPES
         for name in (*MOVING, "clock_rate"):
             if name in self.model.index and name not in kept:
                 out[self.model.index[name]] = 0.0
@@ -304,18 +306,14 @@ class Engine(Watched):
         model = model or self.model
         wanders = self.noise.mean_heading_variance(self.trusted_s)
         estimate = theta, covariance
-        within = possible(self.point, model, estimate, wanders, shaped=self.shaped)
+        within = possible(self.point, model, estimate, wanders, apart=self.apart)
         return moved(self.point, model, within)
 
     @property
-    def shaped(self) -> bool:
-        """Whether the linearisation follows the shapes of the receiver's response.
-
-        Of fixes further apart than is looked around them, shares of what is an epoch apart stand
-        for something else.
-        """
+    def apart(self) -> float:
+        """From one fix to the next, s; inf if there are none."""
         steps = [middle(np.diff(b.fixes.t)) for b in self.batches if len(b.fixes) > 1]
-        return bool(steps) and middle(np.array(steps)) <= AROUND_SPAN_S
+        return middle(np.array(steps)) if steps else math.inf
 
     def _move(self, point: Linearisation, levels: NoiseLevels) -> None:
         self.aged = shifted(self.aged, self.shift(self.point, point))

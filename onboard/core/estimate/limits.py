@@ -11,11 +11,6 @@ from typing import Final
 
 # Linearisation (calibration_model): the range in which timing is looked for.
 
-LONGEST_WINDOW_S: Final = 1.2
-"""Longest averaging span of a receiver, s: what the nodes around a fix resolve, less a margin
-[cost; real receivers ask for 0.5 to 0.95]."""
-DELAY_RANGE_S: Final = (-0.1, 0.45)
-"""Latency of GPS, s: a little before the stamp, or as late as no known receiver is [tuned]."""
 ATTITUDE_DELAY_RANGE_S: Final = (-0.15, 0.15)
 """Lateness of the recorded attitude, s [physics: beyond it streams are not of one vehicle]."""
 SHAPE_RANGE: Final = ((0.0, 0.0, -1.0, 0.0), (1.0, 1.0, 1.0, 1.0))

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S, still
 from onboard.core.inputs.gyroscopes import rates_at
 from onboard.core.inputs.limits import (
-    AFTER_S,
-    AHEAD_S,
     ATTITUDE_MARGIN_S,
+    EVEN_MARGIN_S,
     FELT_M_S2,
     FEWEST_FIXES,
     FEWEST_SAMPLES,
@@ -25,8 +24,6 @@ from onboard.core.inputs.limits import (
     LEAST_WAITING_S,
     LONGEST_ROLL_S,
     MOST_STUCK,
-    REACH_MARGIN_S,
-    REACH_S,
     ROLLED_OUT_S,
     SAME_M_S2,
     SAME_RAD_S,
@@ -34,6 +31,7 @@ from onboard.core.inputs.limits import (
     TOUCHED_S,
 )
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.reach import FAR, Reach
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
 from onboard.core.inputs.rolling import Rolling
 from onboard.core.inputs.samples import GpsFix
@@ -114,8 +112,8 @@ class Assembly:
         if len(waiting) < 2 or waiting.last - waiting.first < least:
             return {}
         self.streams.settle()
-        live = self.streams.live
-        ready = self._ready(everything=everything, grounded=grounded, touched=touched)
+        live, reach = self.streams.live, waiting.reach
+        ready = self._ready(reach, everything=everything, grounded=grounded, touched=touched)
         if min(ready, waiting.last) - waiting.first < least:
             return {}
         taken, trusted, t = waiting.take(ready)
@@ -133,7 +131,7 @@ class Assembly:
                 batch
                 for a, b in pieces
                 for batch in self._cut(
-                    imu, live, flight.between(a, b + 1), believed[a : b + 1], parameters
+                    imu, live, flight.between(a, b + 1), believed[a : b + 1], parameters, reach
                 )
             ]
             if batches:
@@ -142,22 +140,24 @@ class Assembly:
             self._continues.clear()
         flown = float(t[end - 1] - t[first]) if first < end else 0.0
         self.standing_s += float(t[-1] - t[0]) - flown
-        self.streams.drop_before(float(t[-1]) - REACH_S - KEPT_S)
+        self.streams.drop_before(float(t[-1]) - FAR.before - KEPT_S)
         return out
 
-    def _ready(self, *, everything: bool, grounded: bool | None, touched: float) -> float:
+    def _ready(
+        self, reach: Reach, *, everything: bool, grounded: bool | None, touched: float
+    ) -> float:
         """Until when fixes may be handed out: samples are there, and the ground is known, s."""
         live = self.streams.live.values()
-        ready = min((track.last for track in live), default=-np.inf) - AHEAD_S
+        ready = min((track.last for track in live), default=-np.inf) - reach.ahead
         if grounded is False and not everything:
-            return min(ready - TOUCHED_S, self._stood())
+            return min(ready - TOUCHED_S, self._stood(reach))
         if grounded is False and touched < np.inf:
-            return min(ready, touched, self._stood())
+            return min(ready, touched, self._stood(reach))
         if grounded is None and not everything:
             return min(ready, self._rolling.held(*self.streams.fixes.motion(ready)))
         return ready
 
-    def _stood(self) -> float:
+    def _stood(self, reach: Reach) -> float:
         """Until when nothing is of the ground on which it stands now, s; inf if it does not.
 
         What is still right before the word that it has landed is on the ground, for a hover comes
@@ -166,7 +166,7 @@ class Assembly:
         """
         fixes = self.streams.fixes
         stands = ROLLED_OUT_S <= fixes.last - fixes.moved < LONGEST_ROLL_S
-        return fixes.moved - REACH_S - AHEAD_S if stands else np.inf
+        return fixes.moved - reach.before - reach.ahead if stands else np.inf
 
     def _flown(
         self, live: dict[int, ImuTrack], fixes: Fixes, *, grounded: bool | None
@@ -187,6 +187,7 @@ class Assembly:
         fixes: Fixes,
         trusted: NDArray[np.bool_],
         parameters: ParametersInForce,
+        reach: Reach,
     ) -> list[Batch]:
         """Batches of one accelerometer: pieces without inertial gaps, from a trusted fix on."""
         stamps, rows = self._measured(imu, live, fixes)
@@ -196,12 +197,12 @@ class Assembly:
             return []
         t = stamps - parameters.imu_delay
         out: list[Batch] = []
-        for needed, inside in _pieces(t, fixes.t):
+        for needed, inside in _pieces(t, fixes.t, reach):
             gyro, turning = _with_rates(imu, live, stamps[needed], rows[needed], parameters)
             # Another gyroscope has another bias: the filter's belongs to the one before.
             same = self._gyro.get(imu, gyro) == gyro
             fresh = not same or self._continues.get(imu) != float(fixes.t[inside[0]])
-            known = fixes.t[inside] >= self.streams.recorded.first + REACH_S
+            known = fixes.t[inside] >= self.streams.recorded.first + reach.before
             good = inside[trusted[inside] & known]
             # Flight without a fix to be believed goes on inertially, if anything went before.
             if fresh and len(good) == 0:
@@ -213,7 +214,10 @@ class Assembly:
                 continue
             chosen = fixes.between(first, last + 1)
             followed = gyro == parameters.attitude_imu
-            segment = self._segment(t[needed], turning, chosen, parameters, imu, followed=followed)
+            cut = _needed(t[needed], chosen.t, reach)
+            segment = self._segment(
+                t[needed[cut]], turning[cut], parameters, imu, followed=followed
+            )
             out.append(Batch(segment, chosen, trusted[first : last + 1], fresh))
             self._continues[imu], self._gyro[imu] = float(fixes.t[last]), gyro
         return out
@@ -242,15 +246,12 @@ class Assembly:
         self,
         t: Array,
         rows: Array,
-        fixes: Fixes,
         parameters: ParametersInForce,
         imu: int,
         *,
         followed: bool,
     ) -> Segment:
-        """Samples that these fixes need, the gyroscope on the accelerometer's times."""
-        cut = _needed(t, fixes.t)
-        t, rows = t[cut], rows[cut]
+        """Samples with the gyroscope on the accelerometer's times."""
         # Not views: they would keep the temperature of every sample alive.
         t, w_b, raw_s = t.copy(), rows[:, :3].copy(), rows[:, 3:6].copy()
         lag = parameters.gyro_lag
@@ -344,26 +345,28 @@ def mean_step(t: Array) -> float:
     return float(np.mean(steps[steps <= IMU_GAP_S])) if np.any(steps <= IMU_GAP_S) else np.inf
 
 
-def _pieces(t: Array, epochs: Array) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def _pieces(
+    t: Array, epochs: Array, reach: Reach
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Pieces without inertial gaps: indices of the samples needed, and of the fixes inside."""
     breaks = np.flatnonzero(np.diff(t) > IMU_GAP_S) + 1
     for piece in np.split(np.arange(len(t)), breaks):
         if len(piece) < FEWEST_SAMPLES:
             continue
-        begin, end = t[piece[0]] + REACH_S - REACH_MARGIN_S, t[piece[-1]] - AFTER_S
+        begin, end = t[piece[0]] + reach.before - EVEN_MARGIN_S, t[piece[-1]] - reach.after
         inside = np.flatnonzero((epochs >= begin) & (epochs <= end))
         if len(inside) == 0:
             continue
-        needed = piece[_needed(t[piece], epochs[inside])]
+        needed = piece[_needed(t[piece], epochs[inside], reach)]
         if len(needed) >= FEWEST_SAMPLES:
             yield needed, inside
 
 
-def _needed(t: Array, epochs: Array) -> slice:
+def _needed(t: Array, epochs: Array, reach: Reach) -> slice:
     """The samples at ``t`` that fixes at ``epochs`` need, to either side of them."""
     return slice(
-        int(np.searchsorted(t, epochs[0] - REACH_S - REACH_MARGIN_S)),
-        int(np.searchsorted(t, epochs[-1] + AHEAD_S)),
+        int(np.searchsorted(t, epochs[0] - reach.before - EVEN_MARGIN_S)),
+        int(np.searchsorted(t, epochs[-1] + reach.ahead)),
     )
 
 

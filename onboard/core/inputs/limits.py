@@ -14,18 +14,22 @@ LONGEST_FIX_GAP_S: Final = 2.5
 """s; receivers report at 1 Hz or faster and may miss one: longer without a fix is an outage, not
 trusted flight [data sheet]."""
 
-# What is needed around a fix (assembly).
+# What is needed around a fix (reach).
 
-REACH_S: Final = 1.2
-"""s; inertial samples are needed this long before a fix's stamp: latency and half the averaging
-span [physics: the longest latency 0.45, the nodes' 0.62, and a margin]."""
-REACH_MARGIN_S: Final = 0.1
-"""s; by which samples are taken from earlier than that, for even times move a little [cost]."""
-AHEAD_S: Final = 0.8
-"""s; and this long after it [physics: a negative latency 0.1, the nodes' 0.62, and a margin]."""
-AFTER_S: Final = 0.63
-"""s; without which after the last fix of a piece nothing of it is taken [physics: the
-nodes' 0.62]."""
+AROUND_S: Final = 0.62
+"""s to either side of the moment that a fix tells of: receivers average over less than 1.2 s
+[physics: those of real flights ask for 0.5 to 0.95]."""
+AROUND_SLOW_S: Final = 1.05
+"""s; the same where fixes are further apart than that: receivers report at 1 Hz or faster, and a
+line between two fixes weighs either [data sheet]."""
+RESOLVED_ENDS_S: Final = 0.02
+"""s by which either end of the longest span is within it: nodes are so far apart [cost]."""
+DELAY_RANGE_S: Final = (-0.1, 0.45)
+"""Latency of GPS, s: a little before the stamp, or as late as no known receiver is [tuned]."""
+REACH_MARGINS_S: Final = (0.13, 0.08)
+"""s; by which samples reach further back and ahead than that [cost]."""
+EVEN_MARGIN_S: Final = 0.1
+"""s; by which they are taken from earlier still, for even times move a little [cost]."""
 KEPT_S: Final = 0.3
 """s; samples are kept this much longer than they reach [cost]."""
 SLOW_KEPT_S: Final = 1.0

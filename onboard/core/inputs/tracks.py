@@ -23,6 +23,7 @@ from onboard.core.inputs.limits import (
     STILL_M_S,
     TEMPERATURE_EVERY,
 )
+from onboard.core.inputs.reach import Reach, reach_of
 from onboard.core.inputs.rows import Rows
 from onboard.core.inputs.samples import COARSE, GpsFix, ImuSample, ImuSource
 from onboard.core.inputs.segments import Signal
@@ -285,6 +286,11 @@ class FixTrack:
     def last(self) -> float:
         """Stamp of the newest fix; -inf if there is none."""
         return self._fixes[-1][0].t if self._fixes else -np.inf
+
+    @property
+    def reach(self) -> Reach:
+        """How far from the fixes that wait samples are needed."""
+        return reach_of((self.last - self.first) / (len(self) - 1) if len(self) > 1 else 0.0)
 
     def add(self, fix: GpsFix, *, trusted: bool) -> bool:
         """Keep a new fix; False for the repeats that a faster stream sends between fixes."""

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from onboard.core.inputs.limits import AROUND_S
+from onboard.core.inputs.reach import apart_of, reach_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.frames import skew
 from onboard.core.model.linearisation import SHAPES
@@ -24,17 +26,14 @@ from onboard.core.model.spread import (
     velocity_weights,
 )
 
-AROUND_SPAN_S = 0.62
-"""Reach of the nodes to either side of an epoch: receivers average over less than 1.2 s, which is
-the most that is looked for [physics]."""
 FEWEST_PAIRS = 20
-"""Of nodes in that time, however slow the samples: 31 ms each, within which a manoeuvre of 2 Hz
-bends by 2 % [cost]."""
+"""Of nodes in :data:`AROUND_S`, however slow the samples: 31 ms each, within which a manoeuvre of
+2 Hz bends by 2 % [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """The antenna's velocity before K epochs, as far as nodes reach (:data:`AROUND_SPAN_S`).
+    """The antenna's velocity before K epochs, as far as :mod:`onboard.core.inputs.reach` looks.
 
     Attributes:
         gained: velocity, in the axes of the segment's first node.
@@ -109,7 +108,8 @@ def around(
         shares: (4,) of other shapes than an even mean; None: none.
     """
     lever = maker.segment.lever_arm_b + (0.0 if antenna is None else antenna)
-    followed = _Followed(maker, float(epoch[0]), float(epoch[-1]), lever)
+    reach = reach_of(apart_of(epoch)).around
+    followed = _Followed(maker, (float(epoch[0]), float(epoch[-1])), reach, lever)
     force, there = followed.force, followed.there
     now = maker.signals(epoch)
     R, swing = followed.swing(now, window)
@@ -120,7 +120,7 @@ def around(
         return out
 
     shares = np.zeros(len(SHAPES)) if shares is None else shares
-    response = Response(there, epoch, window, shares, AROUND_SPAN_S)
+    response = Response(there, epoch, window, shares, reach)
     even = force.seen(epoch, [averaged(window, force.step)])[0]
     made = (even + response.shaped, response.place, response.force, response.slope)
     seen, place, f_mean, slope, *shapes = own(np.concatenate([np.stack(made), response.shapes]))
@@ -150,21 +150,23 @@ def lever_velocity(w_b: Array) -> Array:
 class _Followed:
     """Attitude and force of a segment at even nodes, in the axes of the first."""
 
-    def __init__(self, maker: NodeMaker, first: float, last: float, lever: Array) -> None:
-        """Follow them from before the epoch ``first`` until after ``last``, s.
+    def __init__(
+        self, maker: NodeMaker, epochs: tuple[float, float], reach: float, lever: Array
+    ) -> None:
+        """Follow them from before the first of epochs until after the last.
 
         Args:
             maker: of the nodes.
-            first: s.
-            last: s.
+            epochs: the first and the last, s.
+            reach: to either side of an epoch, s.
             lever: (3,) to another place whose force is followed, too, body axes, m.
         """
         self._maker = maker
         # Twice as many as between epochs, for those lie anywhere between these.
-        pairs = max(FEWEST_PAIRS, int(np.ceil(NODES_PER_SAMPLE * maker.rate * AROUND_SPAN_S)))
-        self._step = AROUND_SPAN_S / (2 * pairs)
-        self._start = first - AROUND_SPAN_S - self._step
-        self._count = int(np.ceil((last + AROUND_SPAN_S - self._start) / self._step)) + 2
+        pairs = max(FEWEST_PAIRS, int(np.ceil(NODES_PER_SAMPLE * maker.rate * AROUND_S)))
+        self._step, self._reach = AROUND_S / (2 * pairs), reach
+        self._start = epochs[0] - reach - self._step
+        self._count = int(np.ceil((epochs[1] + reach - self._start) / self._step)) + 2
         nodes = maker.followed(self._start, self._step, self._count, lever)
         self._R, force, there = nodes
         self.force = Gained(self._start, self._step, force)
@@ -188,7 +190,7 @@ class _Followed:
             apart: epochs, s.
             shares: (4,) of other shapes than an even mean.
         """
-        each = max(1, int(AROUND_SPAN_S / FEWEST_PAIRS / self._step))
+        each = max(1, int(AROUND_S / FEWEST_PAIRS / self._step))
         step = each * self._step
         t: Array = self._start + step * np.arange(-(-self._count // each), dtype=np.float64)
         at = nodes_within(reaches(window, apart, shares), (epoch - t[0]) / step, step)
@@ -216,7 +218,7 @@ class _Followed:
         """
         if window < 2.0 * self._step:
             return self.attitude(now.t), lever_velocity(now.w_b)
-        half = min(window / 2.0, AROUND_SPAN_S)
+        half = min(window / 2.0, self._reach)
         all_ = self.attitude(np.concatenate([now.t, now.t + half, now.t - half]))
         R, after, before = all_.reshape(3, -1, 3, 3)
         out: Array = np.swapaxes(R, -1, -2) @ (after - before) / (2.0 * half)

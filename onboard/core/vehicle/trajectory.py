@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from onboard.core.estimate.misread import Misread
-from onboard.core.inputs.limits import AHEAD_S, REACH_MARGIN_S, REACH_S
+from onboard.core.inputs.limits import EVEN_MARGIN_S
+from onboard.core.inputs.reach import apart_of, reach_of
 from onboard.core.inputs.segments import Batch, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -174,8 +175,9 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     for k, batch in enumerate(run):
         s, fix_t = batch.segment, batch.fixes.t
         # Of a segment that was cut, because it clips, no more than fixes need.
-        start = run[k - 1].fixes.t[-1] if k else fix_t[0] - REACH_S - REACH_MARGIN_S
-        end = fix_t[-1] + (AHEAD_S if k == len(run) - 1 else 0.0)
+        reach = reach_of(apart_of(fix_t))
+        start = run[k - 1].fixes.t[-1] if k else fix_t[0] - reach.before - EVEN_MARGIN_S
+        end = fix_t[-1] + (reach.ahead if k == len(run) - 1 else 0.0)
         f_b, before = sensors.force(s, before)
         own = (s.t > start) & (s.t <= end)
         t = s.t[own]

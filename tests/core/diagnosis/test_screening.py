@@ -8,7 +8,7 @@ import pytest
 from onboard.core.diagnosis.effort import SHORTEST_S
 from onboard.core.diagnosis.limits import MARGIN_S
 from onboard.core.diagnosis.screening import unclipped
-from onboard.core.estimate.limits import DELAY_RANGE_S
+from onboard.core.inputs.limits import DELAY_RANGE_S
 from tests.core.diagnosis.flights import batches, resting
 
 T0 = 100.0

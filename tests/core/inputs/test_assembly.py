@@ -7,13 +7,11 @@ import pytest
 
 from onboard.core.inputs.assembly import Assembly, AssemblySettings
 from onboard.core.inputs.limits import (
-    AFTER_S,
-    AHEAD_S,
     ATTITUDE_MARGIN_S,
     IMU_GAP_S,
-    REACH_S,
 )
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.reach import FAR, NEAR
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 
 RATE, FIXES = 50.0, 5.0
@@ -39,10 +37,10 @@ def fix(t):
     )
 
 
-def flown(end=60.0, holes=(), doubted=(), batch_s=10.0, offset=0.0):
+def flown(end=60.0, holes=(), doubted=(), batch_s=10.0, rate=FIXES):
     """Batches of one accelerometer, in order, and the times of samples and of fixes."""
     assembly, parameters = Assembly(AssemblySettings(batch_s=batch_s)), ParametersInForce()
-    imu, gps = times(1, end, RATE, holes), np.arange(0.1, end, 1.0 / FIXES)
+    imu, gps = times(1, end, RATE, holes), np.arange(0.1, end, 1.0 / rate)
     merged = sorted([(t, 0) for t in imu] + [(t, 1) for t in imu] + [(t, 2) for t in gps])
     out = []
     for t, kind in merged:
@@ -66,21 +64,30 @@ CASES = [
     {"doubted": ((0.0, 5.0), (25.0, 40.0))},
     {"holes": ((22.0, 23.0),), "doubted": ((20.0, 30.0),)},
     {"batch_s": 3.0, "holes": ((20.0, 21.0),)},
+    {"rate": 1.0},
+    {"rate": 0.7, "holes": ((20.0, 21.0),)},
+    {"rate": 1.0, "doubted": ((0.0, 5.0), (25.0, 40.0))},
 ]
+
+
+def reach(rate=FIXES, **_):
+    """Slow fixes have their neighbours looked at."""
+    return FAR if 1.0 / rate > NEAR.around else NEAR
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_batch_has_every_sample_that_its_fixes_need(case):
     batches, imu, _, delay = flown(**case)
+    need = reach(**case)
     assert batches
     for batch in batches:
         t = batch.segment.t
         assert np.diff(t).max() <= IMU_GAP_S
         needed = imu - delay
-        first, last = batch.fixes.t[0] - REACH_S, batch.fixes.t[-1] + AHEAD_S
+        first, last = batch.fixes.t[0] - need.before, batch.fixes.t[-1] + need.ahead
         wanted = needed[(needed >= first) & (needed < last)]
         assert np.all(np.isin(wanted[wanted <= t[-1]], t))
-        assert t[0] <= batch.fixes.t[0] - REACH_S + 0.1 + 1.0 / RATE
+        assert t[0] <= batch.fixes.t[0] - need.before + 0.1 + 1.0 / RATE
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -118,20 +125,21 @@ def test_a_batch_is_fresh_exactly_where_it_does_not_continue(case):
 
 
 @pytest.mark.parametrize("holes", [(), ((20.0, 21.0),), ((30.0, 34.0), (44.0, 44.2))])
-def test_a_fix_is_used_exactly_if_samples_without_a_gap_are_around_it(holes):
+@pytest.mark.parametrize("rate", [FIXES, 1.0])
+def test_a_fix_is_used_exactly_if_samples_without_a_gap_are_around_it(holes, rate):
     """Brute force: walk from each fix to either side until a gap or the need is met."""
-    batches, imu, gps, delay = flown(holes=holes, batch_s=1e9)
+    batches, imu, gps, delay = flown(holes=holes, batch_s=1e9, rate=rate)
+    need = reach(rate)
     used = np.concatenate([x.fixes.t for x in batches])
     t = imu - delay
     for at in gps:
         before, after = t[t <= at][::-1], t[t > at]
         reached = covered(at, before, -1.0), covered(at, after, 1.0)
         # The first fixes wait for an attitude that is old enough.
-        enough = (
-            reached[0] >= REACH_S - 0.1 and reached[1] >= AFTER_S + 0.02 and at >= imu[0] + REACH_S
-        )
-        clear = reached[0] < REACH_S - 0.15 or reached[1] < AFTER_S - 0.02 or at < imu[0] + REACH_S
-        if enough and at <= t[-1] - AHEAD_S - 0.1:
+        known = at >= imu[0] + need.before
+        enough = reached[0] >= need.before - 0.1 and reached[1] >= need.after + 0.02 and known
+        clear = reached[0] < need.before - 0.15 or reached[1] < need.after - 0.02 or not known
+        if enough and at <= t[-1] - need.ahead - 0.1:
             assert np.any(np.abs(used - at) < 1e-6), at
         elif clear:
             assert not np.any(np.abs(used - at) < 1e-6), at

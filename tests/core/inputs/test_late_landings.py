@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.assembly import Assembly, AssemblySettings
-from onboard.core.inputs.limits import AHEAD_S, GROUND_M, LONGEST_ROLL_S, REACH_S, TOUCHED_S
+from onboard.core.inputs.limits import GROUND_M, LONGEST_ROLL_S, TOUCHED_S
 from onboard.core.inputs.parameters import ParametersInForce
+from onboard.core.inputs.reach import NEAR
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 
 RATE, FIXES = 50.0, 5.0
@@ -62,8 +63,8 @@ def test_how_late_the_word_is_makes_no_flight(late):
     landing = (60.0, FLYING), (8.0, DESCENDING)
     got = spans(batches_of(*landing, word_after=late))
     assert got == spans(batches_of(*landing, word_after=20.0))
-    assert got[-1][1] <= 68.0 - REACH_S - AHEAD_S
-    assert got[-1][1] >= 68.0 - REACH_S - AHEAD_S - 2.0 / FIXES
+    assert got[-1][1] <= 68.0 - NEAR.before - NEAR.ahead
+    assert got[-1][1] >= 68.0 - NEAR.before - NEAR.ahead - 2.0 / FIXES
 
 
 def test_a_word_that_comes_in_time_is_believed():
@@ -79,14 +80,14 @@ def test_a_hover_is_flight(hover, after):
     got = spans(batches_of((60.0, FLYING), (hover, HOVERING), after, word_after=15.0))
     assert all(a[1] == b[0] for a, b in itertools.pairwise(got))
     landed = 60.0 + hover + after[0]
-    assert got[-1][1] >= landed - REACH_S - AHEAD_S - 2.0 / FIXES
+    assert got[-1][1] >= landed - NEAR.before - NEAR.ahead - 2.0 / FIXES
     assert got[-1][1] <= landed
     assert max(b - a for a, b in got) < 2.0 * batch_s + 1.0 / FIXES
 
 
 def test_a_recording_that_ends_in_a_hover_has_all_of_it():
     got = spans(batches_of((60.0, FLYING), (50.0, HOVERING)))
-    assert got[-1][1] > 110.0 - AHEAD_S - 2.0 / FIXES
+    assert got[-1][1] > 110.0 - NEAR.ahead - 2.0 / FIXES
     assert max(b - a for a, b in got) < 20.0 + 1.0 / FIXES
 
 
@@ -102,4 +103,4 @@ def test_a_slow_descent_is_flight_until_it_is_near_the_ground(sinking, climbs):
     got = spans(batches_of(*landing, word_after=20.0, climbs=climbs))
     assert all(a[1] == b[0] for a, b in itertools.pairwise(got))
     low = GROUND_M / sinking
-    assert 140.0 - low - REACH_S - AHEAD_S - 2.0 / FIXES <= got[-1][1] <= 140.0 - AHEAD_S
+    assert 140.0 - low - NEAR.before - NEAR.ahead - 2.0 / FIXES <= got[-1][1] <= 140.0 - NEAR.ahead

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from onboard.core.inputs.limits import AROUND_S
 from onboard.core.inputs.segments import Segment
-from onboard.core.model.around import AROUND_SPAN_S, around
+from onboard.core.model.around import around
 from onboard.core.model.quadrature import NodeMaker
 from onboard.core.model.smoothing import (
     RESOLVED_S,
@@ -22,7 +23,7 @@ from onboard.core.model.smoothing import (
 from tests.core.model.test_quadrature import NOMINAL, attitude, force, maker, rates
 
 EPOCH = np.array([0.4, 1.5, 2.6])
-LONGEST = 2.0 * AROUND_SPAN_S
+LONGEST = 2.0 * AROUND_S
 
 
 def gained(a, seconds=2.0, step=0.01):

@@ -14,7 +14,8 @@ import pytest
 from benchmarks.concealing import Secret
 from benchmarks.explaining import heard
 from onboard.core.diagnosis.procedure import diagnose
-from onboard.core.model.around import AROUND_SPAN_S, Past
+from onboard.core.inputs.limits import AROUND_S
+from onboard.core.model.around import Past
 from onboard.core.model.smoothing import Gained
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.accelerometer_hysteresis import AccelerometerHysteresis
@@ -89,7 +90,7 @@ def test_nothing_is_seen_of_a_steady_velocity_or_acceleration(rate):
 def test_no_more_of_the_past_is_asked_for_than_there_is():
     effect = GpsOvershoot(Origin(t0=0.0))
     assert effect._before.min() > 0.0
-    assert effect._before.max() < AROUND_SPAN_S
+    assert effect._before.max() < AROUND_S
 
 
 @pytest.mark.slow

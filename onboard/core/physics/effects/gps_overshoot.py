@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from onboard.core.inputs.limits import AROUND_S
 from onboard.core.maths.arrays import Array
-from onboard.core.model.around import AROUND_SPAN_S, Around
+from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics.effect import Bearing, Effect, Origin
 from onboard.core.physics.octaves import WEIGHTS, sigma_of_shapes
@@ -65,7 +66,7 @@ class GpsOvershoot(Effect):
 
 def _weights() -> tuple[Array, Array]:
     """Moments of the past (n,), s, and what each weighs in one unit of size and shape, (3, n)."""
-    edges = np.linspace(0.0, AROUND_SPAN_S, round(AROUND_SPAN_S / STEP_S) + 1)
+    edges = np.linspace(0.0, AROUND_S, round(AROUND_S / STEP_S) + 1)
     before = 0.5 * (edges[1:] + edges[:-1])
     # What is older counts as the parabola through now, half of the past and all of it, so that of
     # a steady acceleration nothing is to be seen, and of a steady jerk what the size says.
