@@ -73,6 +73,7 @@ class Around:
         slope: (K, 3) derivative of the response, at the antenna, to the square of the span, m/s^3.
         shapes: (K, 3, 4) how else velocities may be averaged that spread alike, m/s
             (:mod:`onboard.core.model.response`).
+        shape_places: (K, 3, 4) the same of the antenna's place, m.
         swing: (K, 3, 3) what the receiver sees of a lever arm, per m: mean of ``w x`` over the
             span that it averages, 1/s.
         past: what the antenna's velocity was before.
@@ -86,6 +87,7 @@ class Around:
     f_mean: Array
     slope: Array
     shapes: Array
+    shape_places: Array
     swing: Array
     past: Past
     spread: Spread | None = None
@@ -123,7 +125,8 @@ def around(
     response = Response(there, epoch, window, shares, reach)
     even = force.seen(epoch, [averaged(window, force.step)])[0]
     made = (even + response.shaped, response.place, response.force, response.slope)
-    seen, place, f_mean, slope, *shapes = own(np.concatenate([np.stack(made), response.shapes]))
+    every = own(np.concatenate([np.stack(made), response.shapes, response.places]))
+    (seen, place, f_mean, slope), shapes = every[:4], np.moveaxis(every[4:], 0, -1)
     return Around(
         now,
         R,
@@ -131,7 +134,8 @@ def around(
         place,
         f_mean,
         slope,
-        np.stack(shapes, axis=-1),
+        shapes[..., : len(SHAPES)],
+        shapes[..., len(SHAPES) :],
         swing,
         Past(there, epoch, R),
         followed.spread(epoch, R, window, response.apart, shares) if window > 0.0 else None,
@@ -201,7 +205,7 @@ class _Followed:
             R_epoch,
             at,
             velocity_weights(since, step, window, apart, shares),
-            place_weights(since, step, window),
+            place_weights(since, step, window, apart, shares),
         )
 
     def swing(self, now: Signals, window: float) -> tuple[Array, Array]:

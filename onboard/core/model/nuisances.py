@@ -126,9 +126,8 @@ class GpsSmoothing(Family):
         return Direct(body=np.concatenate([around.slope[..., None], around.shapes], axis=-1))
 
     def position(self, around: Around) -> Direct:
-        """``a / 24``: the mean of a parabola over the span, in whichever shape."""
-        body = np.zeros((len(around.now.t), 3, len(self.unknowns)))
-        body[..., 0] = around.f_mean / 24.0
+        """``a / 24``: the mean of a parabola over the span, in whichever shape; and these."""
+        body = np.concatenate([around.f_mean[..., None] / 24.0, around.shape_places], axis=-1)
         ned = np.zeros_like(body)
         ned[:, 2, 0] = STANDARD_GRAVITY / 24.0
         return Direct(body=body, ned=ned)

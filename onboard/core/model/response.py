@@ -26,8 +26,10 @@ from onboard.core.model.smoothing import (
     averaged_place,
     change,
     lagged,
+    lagged_place,
     mean,
     paired,
+    paired_place,
     slope,
     times,
     weight_of_two,
@@ -48,7 +50,8 @@ class Response:
         shaped: (K, 3) what their shares make of it, m/s.
         force: (K, 3) what the response changes by with time, m/s^2.
         slope: (K, 3) what it changes by with ``window^2``, m/s^3.
-        place: (K, 3) the mean of the place less that at the epoch, m.
+        place: (K, 3) what it makes of the place less that at the epoch, m.
+        places: (4, K, 3) the other shapes' of the place less the even mean's, m.
         apart: from one epoch to the next, s, as far as the velocity is known.
     """
 
@@ -70,9 +73,12 @@ class Response:
         shaped = _shared(shares, shapes)
         force = mean(window, step) + change(shaped, LATER_S)
         along = slope(window, 2.0 * reach, step)
-        seen = velocity.seen(t, [*shapes, shaped, force, along, averaged_place(window)], window)
+        places = _less_even_place(window, self.apart)
+        place = averaged_place(window) + _shared(shares, places)
+        seen = velocity.seen(t, [*shapes, *places, shaped, force, along, place], window)
         self.shapes: Array = seen[: len(SHAPES)]
-        self.shaped, self.force, self.slope, self.place = seen[len(SHAPES) :]
+        self.places: Array = seen[len(SHAPES) : 2 * len(SHAPES)]
+        self.shaped, self.force, self.slope, self.place = seen[2 * len(SHAPES) :]
         if shaped and window >= RESOLVED_S:
             widths = (1.0 + WIDER) * window, (1.0 - WIDER) * window
             shares_wide, shares_narrow = (
@@ -93,6 +99,20 @@ def _less_even(window: float, apart: float, step: float) -> list[Combination]:
         paired(window, 1.0 - less) + less_even,
         times(0.5, paired(window, 0.25)) + times(-0.5, paired(window, 0.75)),
         lagged(window) + less_even,
+    ]
+
+
+def _less_even_place(window: float, apart: float) -> list[Combination]:
+    """The same of the place."""
+    less = weight_of_two(window, apart)
+    if less <= 0.0:
+        return [()] * len(SHAPES)
+    less_even = times(-1.0, averaged_place(window))
+    return [
+        paired_place(window, less) + less_even,
+        paired_place(window, 1.0 - less) + less_even,
+        times(0.5, paired_place(window, 0.25)) + times(-0.5, paired_place(window, 0.75)),
+        lagged_place(window) + less_even,
     ]
 
 

@@ -101,6 +101,11 @@ def paired(window: float, older: float = 0.5) -> Combination:
     return both + times(-1.0, NOW)
 
 
+def paired_place(window: float, older: float = 0.5) -> Combination:
+    """``mean(X) - X`` of the moments of :func:`paired`, m."""
+    return tuple((shift, 0.0, weight, 0.0) for shift, weight, _, _ in paired(window, older))
+
+
 def lagged(window: float) -> Combination:
     """``lag(V) - V`` of a first-order lag that spreads like ``window``, s, m/s.
 
@@ -110,6 +115,12 @@ def lagged(window: float) -> Combination:
     """
     lag = lag_of(window)
     return () if lag <= 0.0 else ((lag, 1.0, 0.0, -lag), *times(-1.0, NOW))
+
+
+def lagged_place(window: float) -> Combination:
+    """``lag(X) - X`` of the lag of :func:`lagged`, m: ``X`` less the time constant times its V."""
+    lag = lag_of(window)
+    return () if lag <= 0.0 else ((lag, -lag, 1.0, lag**2), (0.0, 0.0, -1.0, 0.0))
 
 
 def slope(window: float, longest: float, step: float) -> Combination:

@@ -115,9 +115,19 @@ def velocity_weights(since: Array, step: float, window: float, apart: float, h: 
     return out
 
 
-def place_weights(since: Array, step: float, window: float) -> Array:
-    """(K, n) s^2: those of ``(X(window / 2) + X(-window / 2) - 2 X) / 6``, as of the force's."""
-    out: Array = np.maximum(0.5 * window - np.abs(since), 0.0) * (step / 6.0)
+def place_weights(since: Array, step: float, window: float, apart: float, h: Array) -> Array:
+    """(K, n) s^2: those of the place, as of the force's.
+
+    Of the even mean they are those of ``(X(window / 2) + X(-window / 2) - 2 X) / 6``.
+    """
+    out: Array = np.zeros_like(since)
+    ahead = np.maximum(-since, 0.0)
+    for share, *shape in _shapes(window, apart, h).tolist():
+        if shape[0] == EVEN:
+            out += share * np.maximum(0.5 * window - np.abs(since), 0.0) / 6.0
+        else:
+            out += share * (_beyond(shape, since) - ahead)
+    out *= step
     return out
 
 

@@ -90,7 +90,14 @@ def test_nodes_and_integrals_are_the_same(seed, shares):
         near = around(maker, start, 0.2, np.array([0.1, 0.0, -0.2]), shaped)
         force = inside.signals.f_b[..., None] * x
         signals = (inside.signals.w_b, inside.signals.raw_s, inside.signals.slow("signal"))
-        seen = (near.f_mean, near.averaged, near.averaged_place, near.slope, near.shapes)
+        seen = (
+            near.f_mean,
+            near.averaged,
+            near.averaged_place,
+            near.slope,
+            near.shapes,
+            near.shape_places,
+        )
         of = inside.of_sensors().both
         return (inside.P, of, *inside.integrals(force), *signals, *seen, near.R, near.swing)
 

@@ -74,6 +74,32 @@ def test_two_moments_an_epoch_apart_are_one_of_the_shapes(gained, newer):
     assert value(gained, window, shares) == pytest.approx(seen, abs=1e-9)
 
 
+@pytest.mark.parametrize("shares", [(0.0,) * 4, (1.0, 0.0, 0.0, 0.0), MIXED])
+def test_its_place_changes_by_what_it_makes_of_the_velocity(shares):
+    """And of each shape alike: a place is the velocity's integral, and a mean of it is, too.
+
+    Of motion that is slow enough for Simpson's rule over the span.
+    """
+    gained, h, window = sampled(1.0, step=0.004), 0.02, 0.3
+    earlier, now, later = (response(gained, window, shares, T + by) for by in (-h, 0.0, h))
+    speed = now.shaped + gained.seen(T, [averaged(window, gained.step)])[0]
+    change = (later.place - earlier.place) / (2.0 * h)
+    assert change == pytest.approx(speed, abs=0.03 * np.abs(speed).max())
+    for shape, change in zip(now.shapes, (later.places - earlier.places) / (2.0 * h), strict=True):
+        assert change == pytest.approx(shape, abs=0.05 * np.abs(now.shapes).max())
+
+
+@pytest.mark.parametrize("newer", [0.3, 0.5, 0.8])
+def test_a_place_between_two_epochs_is_on_the_line_between_theirs(gained, newer):
+    window = SPREAD * APART * np.sqrt(newer * (1.0 - newer))
+    shares = (1.0, 0.0, 0.0, 0.0) if newer >= 0.5 else (0.0, 1.0, 0.0, 0.0)
+    place = ((0.0, 0.0, 1.0, 0.0),)
+    at = [gained.seen(T + by * APART, [place])[0] for by in (1.0 - newer, 0.0, -newer)]
+    made = response(gained, window, shares).place
+    seen = newer * at[0] + (1.0 - newer) * at[2] - at[1]
+    assert made == pytest.approx(seen, abs=1e-9)
+
+
 def fitted(gained, seen, passes, *, shaped):
     """Spans of Gauss-Newton steps from 0.25 s, with and without the shares taken in."""
     window, shares, spans = 0.25, np.zeros(4), []

@@ -68,10 +68,11 @@ def test_an_even_acceleration_is_reported_as_it_is(h):
     assert abs(velocity_weights(TAU[None], STEP, 0.3, APART, np.array(h)).sum()) < 1e-9
 
 
-def test_places_are_weighed_as_those_of_the_force():
-    weights = place_weights(TAU[None], STEP, 0.4)[0]
-    # X = t^2 / 2: (X(h) + X(-h) - 2 X) / 6 = h^2 / 6.
-    assert weights.sum() == pytest.approx(0.2**2 / 6.0, rel=1e-3)
+@pytest.mark.parametrize("h", SHARES)
+def test_places_are_weighed_as_those_of_the_force(h):
+    """``X = t^2 / 2``: half the variance of the response, in whichever shape."""
+    weights = place_weights(TAU[None], STEP, 0.3, APART, np.array(h))[0]
+    assert weights.sum() == pytest.approx(0.3**2 / 24.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("h", SHARES)
