@@ -78,15 +78,16 @@ def test_two_moments_an_epoch_apart_are_one_of_the_shapes(gained, newer):
 def test_its_place_changes_by_what_it_makes_of_the_velocity(shares):
     """And of each shape alike: a place is the velocity's integral, and a mean of it is, too.
 
-    Of motion that is slow enough for Simpson's rule over the span.
+    Of motion that is so slow that Simpson's rule leaves two hundredths of an even mean.
     """
     gained, h, window = sampled(1.0, step=0.004), 0.02, 0.3
     earlier, now, later = (response(gained, window, shares, T + by) for by in (-h, 0.0, h))
-    speed = now.shaped + gained.seen(T, [averaged(window, gained.step)])[0]
+    even = gained.seen(T, [averaged(window, gained.step)])[0]
+    speed = even + now.shaped
     change = (later.place - earlier.place) / (2.0 * h)
-    assert change == pytest.approx(speed, abs=0.03 * np.abs(speed).max())
+    assert change == pytest.approx(speed, abs=0.03 * np.abs(even).max())
     for shape, change in zip(now.shapes, (later.places - earlier.places) / (2.0 * h), strict=True):
-        assert change == pytest.approx(shape, abs=0.05 * np.abs(now.shapes).max())
+        assert change == pytest.approx(shape, abs=0.03 * np.abs(even).max())
 
 
 @pytest.mark.parametrize("newer", [0.3, 0.5, 0.8])
