@@ -69,8 +69,8 @@ class Calibrator:
         """
         self.settings = settings = settings or CalibratorSettings()
         self.parameters = ParametersInForce()
-        self._trust = TrustWindow(settings.trust)
         self._assembly = Assembly(settings.assembly)
+        self._trust = TrustWindow(settings.trust, felt=self._assembly.streams.felt)
         self._engines = Engines(settings, self.parameters, only, flight)
         self.earlier = self._engines.earlier
         self._counts: Counter[str] = Counter()

@@ -51,8 +51,9 @@ class PlausibilityLimits:
 
     Attributes:
         acceleration: m/s^2; velocity cannot change by more than ``jump + acceleration dt`` between
-            fixes dt apart (healthy: up to 23 m/s^2 at 5 Hz).
+            fixes dt apart (healthy: up to 23 m/s^2 at 5 Hz), unless as much was felt.
         jump: m/s; see there.
+        felt: what was felt counts so many times [physics: scales are off by a fifth at the most].
         baseline: s over which positions are compared with velocities.
         drift: m/s by which their mean velocities may differ (healthy: up to 1.3).
         drift_acceleration: m/s^2; more by so much times the longest step, for what happens between
@@ -63,6 +64,7 @@ class PlausibilityLimits:
 
     acceleration: float = 30.0
     jump: float = 3.0
+    felt: float = 1.2
     baseline: float = 1.0
     drift: float = 2.5
     drift_acceleration: float = 2.0

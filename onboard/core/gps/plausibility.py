@@ -1,18 +1,22 @@
-"""What a GPS receiver's fixes say against each other, without any other sensor.
+"""What a GPS receiver's fixes say against each other.
 
 A receiver that is being spoofed, multipathed or stuck often still claims a good fix.  Three
 contradictions show it: velocity that jumps, position that does not follow velocity, and a
 moving receiver that repeats itself to the last digit for a while.  One that does so once has
-measured nothing: what comes next is held against the fix before.
+measured nothing: what comes next is held against the fix before.  No other sensor is asked but for
+the most that an accelerometer felt: no velocity changes by more than that and gravity.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from enum import Enum
 
 from onboard.core.gps.limits import PlausibilityLimits
+from onboard.core.inputs.reach import NEAR
 from onboard.core.inputs.samples import GpsFix
+from onboard.core.maths.earth import STANDARD_GRAVITY
 
 _METRES_PER_RADIAN = 6.371e6  # of latitude; a check at the 1 % level needs no ellipsoid
 
@@ -28,8 +32,17 @@ class Contradiction(Enum):
 class FixPlausibility:
     """Compares each fix of one receiver with the ones before it."""
 
-    def __init__(self, limits: PlausibilityLimits | None = None) -> None:
+    def __init__(
+        self, limits: PlausibilityLimits | None = None, felt: Callable[[float], float] | None = None
+    ) -> None:
+        """Take the limits.
+
+        Args:
+            limits: of a fix against the ones before it.
+            felt: the largest specific force since a time, s, m/s^2; None: nobody knows.
+        """
         self._limits = limits or PlausibilityLimits()
+        self._felt = felt
         self.reset()
 
     def reset(self) -> None:
@@ -78,13 +91,27 @@ class FixPlausibility:
         moved = (fix.latitude, fix.longitude) != (last.latitude, last.longitude)
         self._position_moves = self._position_moves or moved
         dt = fix.t - last.t
-        if _velocity_change(last, fix) > self._limits.jump + self._limits.acceleration * dt:
+        if self._jumps(last, fix, dt):
             self._restart_baseline(fix)
             return Contradiction.JUMP
         if self._anchor is None:
             self._restart_baseline(fix)
             return None
         return Contradiction.DRIFT if self._drifts(last, self._anchor, fix) else None
+
+    def _jumps(self, last: GpsFix, fix: GpsFix, dt: float) -> bool:
+        """Whether velocity changed by more than a vehicle's can, or than this one's did."""
+        limits, change = self._limits, _velocity_change(last, fix)
+        if change <= limits.jump + limits.acceleration * dt:
+            return False
+        return change > limits.jump + self._accelerated(last.t) * dt
+
+    def _accelerated(self, since: float) -> float:
+        """The most that a velocity that is told since then (s) changes by, m/s^2, as was felt."""
+        if self._felt is None:
+            return 0.0
+        # What a late fix tells of was felt before it.
+        return self._limits.felt * self._felt(since - NEAR.before) + STANDARD_GRAVITY
 
     def _moves(self, fix: GpsFix) -> bool:
         return math.hypot(fix.v_n, fix.v_e) > self._limits.frozen_speed
@@ -108,9 +135,15 @@ class FixPlausibility:
         eastward = math.remainder(fix.longitude - anchor.longitude, 2 * math.pi)
         east = eastward * math.cos(fix.latitude) * _METRES_PER_RADIAN
         mismatch = math.hypot(north - self._travelled[0], east - self._travelled[1]) / span
-        limit = self._limits.drift + self._limits.drift_acceleration * self._longest_step
+        longest = self._longest_step
+        limit = self._limits.drift + self._limits.drift_acceleration * longest
         self._restart_baseline(fix)
-        return self._position_moves and mismatch > limit
+        if not self._position_moves or mismatch <= limit:
+            return False
+        # A velocity that changes by so much within a step is off the line between its ends by a
+        # quarter of that in the mean, at the most.
+        swung = 0.25 * self._accelerated(anchor.t) * longest
+        return mismatch > self._limits.drift + swung
 
     def _restart_baseline(self, fix: GpsFix) -> None:
         self._anchor = fix

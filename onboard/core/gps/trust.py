@@ -15,7 +15,7 @@ what it has.  Time is that of the samples; there is no clock here.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Final
 
@@ -64,15 +64,27 @@ class TrustWindow:
     belongs to the window if ``is_open`` after it was fed, and it was neither a repeat nor late.
     """
 
-    def __init__(self, limits: TrustLimits | None = None, *, receiver: int | None = None) -> None:
-        """Take the limits, and the receiver to watch (None: the first that is heard from)."""
+    def __init__(
+        self,
+        limits: TrustLimits | None = None,
+        *,
+        receiver: int | None = None,
+        felt: Callable[[float], float] | None = None,
+    ) -> None:
+        """Take the limits, and the receiver to watch (None: the first that is heard from).
+
+        Args:
+            limits: what a trustworthy fix has.
+            receiver: its number.
+            felt: the largest specific force since a time, s, m/s^2; None: nobody knows.
+        """
         self._limits = limits = limits or TrustLimits()
         self._watched = ReceiverChoice(receiver, limits.fix_type)
         self._phase = Phase.WAITING
         self._reason: Distrust | None = None
         self._held = HeldReasons(limits)
         self._ledger = FixLedger()
-        self._plausibility = FixPlausibility(limits.plausibility)
+        self._plausibility = FixPlausibility(limits.plausibility, felt)
         self._last_fix: float | None = None
         self._last_heard = -math.inf  # any message of the receiver, repeats too
         self._now = -math.inf

@@ -168,6 +168,11 @@ class Streams:
         newest = max((track.last for track in self.imus.values()), default=-np.inf)
         return {i: x for i, x in self.imus.items() if newest - x.last < SILENT_S}
 
+    def felt(self, since: float) -> float:
+        """The largest force that an accelerometer reported since then (s), m/s^2; 0: none did."""
+        self.settle()
+        return max((track.felt(since) for track in self.live.values()), default=0.0)
+
     def refused(self, imu: int) -> Counter[str]:
         """What was refused, by name."""
         out = Counter(self.fixes.refused)

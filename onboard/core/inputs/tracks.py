@@ -117,6 +117,12 @@ class ImuTrack:
         rows.add(t, (*row, celsius))
         return True
 
+    def felt(self, since: float) -> float:
+        """The largest force that was reported since then (s), m/s^2; 0 if none was."""
+        t, rows = self._rows.arrays()
+        recent = rows[np.searchsorted(t, since) :, 3:6] if len(t) else np.zeros((0, 3))
+        return float(np.sqrt((recent**2).sum(axis=1).max(initial=0.0)))
+
     def covers(self, t: float) -> bool:
         """Whether HIGHRES_IMU came so shortly before ``t`` (s) that no coarser one is taken."""
         return t - self.highres_t < HIGHRES_S

@@ -207,6 +207,24 @@ def test_velocity_that_jumps_is_a_glitch_and_real_manoeuvres_are_not():
     assert window.feed(fix(4.4, v_n=38.0)) == (WindowClosed(4.4, Distrust.GPS_GLITCH),)
 
 
+@pytest.mark.parametrize(
+    ("felt", "change", "believed"),
+    [(9.8, 10.0, False), (70.0, 10.0, True), (70.0, 18.0, True), (70.0, 25.0, False)],
+)
+def test_no_velocity_jumps_that_changes_as_the_force_that_was_felt_can_change_it(
+    felt, change, believed
+):
+    """An aerobatic plane pulls 7 g: 14 m/s from one fix to the next, and 2 by gravity."""
+    asked = []
+    window = TrustWindow(felt=lambda since: asked.append(since) or felt)
+    fly(window, 0.0, 4.0, v_d=0.0)
+    assert not asked
+    window.feed(fix(4.2, v_d=change))
+    assert window.is_open is believed
+    # What a late fix tells of was felt before the fix before it.
+    assert 4.0 - asked[0] > 0.5
+
+
 def test_vertical_jumps_count_where_there_is_a_vertical_speed():
     window = TrustWindow()
     fly(window, 0.0, 4.0, v_d=0.0)

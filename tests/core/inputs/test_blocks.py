@@ -116,6 +116,20 @@ def highres(
     return out
 
 
+def pulled(samples: list[Sample], at: int, force: float) -> list[Sample]:
+    """An accelerometer feels so much for half a second, and then it goes to the east, too."""
+    begin, out = time_at(samples, at), []
+    for s in samples:
+        if isinstance(s, ImuSample) and begin <= s.t < begin + 0.5:
+            out.append(replace(s, f_b=(0.0, 0.0, -force)))
+        elif isinstance(s, GpsFix) and s.t >= begin + 0.4:
+            east = 12.0 * (s.t - begin - 0.3) / RADIUS / math.cos(s.latitude)
+            out.append(replace(s, v_e=12.0, longitude=s.longitude + east))
+        else:
+            out.append(s)
+    return out
+
+
 CHANGES = {
     "reboot": lambda s, k: later(s, k, -time_at(s, k) + 1.0),
     "short reboot": lambda s, k: later(s, k, -4.0),
@@ -172,6 +186,8 @@ CHANGES = {
     "landed": lambda s, k: inserted(s, k, VehicleState(time_at(s, k), landed=True)),
     "EKF": lambda s, k: inserted(s, k, EkfHealth(time_at(s, k), 1 << 15 | 1)),
     "spoofed": lambda s, k: inserted(s, k, GpsIntegrity(time_at(s, k), False, True)),
+    "pulled": lambda s, k: pulled(s, k, 70.0),
+    "thrown": lambda s, k: pulled(s, k, 12.0),
     "highres": highres,
     "highres of the second": lambda s, k: highres(s, k, imu=2),
     "slow highres": lambda s, k: highres(s, k, every=40),
@@ -205,6 +221,13 @@ def test_an_ordinary_flight_goes_together(size):
     events, _ = fed(in_blocks(FLIGHT, size), recorded)
     assert sum(isinstance(event, Advanced) for event in events) >= 2
     assert recorded.calibrator.imus == (1, 2)
+
+
+@pytest.mark.parametrize(("force", "glitches"), [(70.0, False), (12.0, True)])
+def test_a_velocity_jumps_if_nothing_was_felt(force, glitches):
+    recorded = Recorded()
+    fed(in_blocks(pulled(FLIGHT, len(FLIGHT) // 2, force), 300), recorded)
+    assert ("gps_glitch" in recorded.calibrator.trust.rejected) is glitches
 
 
 @pytest.mark.parametrize("change", CHANGES)
