@@ -101,17 +101,17 @@ class FixPlausibility:
 
     def _jumps(self, last: GpsFix, fix: GpsFix, dt: float) -> bool:
         """Whether velocity changed by more than a vehicle's can, or than this one's did."""
-        limits, change = self._limits, _velocity_change(last, fix)
-        if change <= limits.jump + limits.acceleration * dt:
-            return False
-        return change > limits.jump + self._accelerated(last.t) * dt
+        limits = self._limits
+        more = _velocity_change(last, fix) - limits.jump - limits.acceleration * dt
+        return more > 0.0 and more > self._excess(last.t) * dt
 
-    def _accelerated(self, since: float) -> float:
-        """The most that a velocity that is told since then (s) changes by, m/s^2, as was felt."""
+    def _excess(self, since: float) -> float:
+        """By how much more velocities told since then (s) can change than others', m/s^2."""
         if self._felt is None:
             return 0.0
         # What a late fix tells of was felt before it.
-        return self._limits.felt * self._felt(since - NEAR.before) + STANDARD_GRAVITY
+        most = self._limits.felt * self._felt(since - NEAR.before) + STANDARD_GRAVITY
+        return max(most - self._limits.acceleration, 0.0)
 
     def _moves(self, fix: GpsFix) -> bool:
         return math.hypot(fix.v_n, fix.v_e) > self._limits.frozen_speed
@@ -142,8 +142,7 @@ class FixPlausibility:
             return False
         # A velocity that changes by so much within a step is off the line between its ends by a
         # quarter of that in the mean, at the most.
-        swung = 0.25 * self._accelerated(anchor.t) * longest
-        return mismatch > self._limits.drift + swung
+        return mismatch > limit + 0.25 * self._excess(anchor.t) * longest
 
     def _restart_baseline(self, fix: GpsFix) -> None:
         self._anchor = fix

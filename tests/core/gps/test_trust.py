@@ -225,6 +225,16 @@ def test_no_velocity_jumps_that_changes_as_the_force_that_was_felt_can_change_it
     assert 4.0 - asked[0] > 0.5
 
 
+@pytest.mark.parametrize(("felt", "believed"), [(9.8, False), (25.0, False), (90.0, True)])
+def test_places_leave_a_velocity_that_swings_between_fixes_behind(felt, believed):
+    """By 4 m/s, where 2.9 are granted to all, and 4.4 more to one that pulls 9 g."""
+    window = TrustWindow(felt=lambda since: felt)
+    fly(window, 0.0, 4.0)
+    for k in range(1, 10):
+        window.feed(fix(4.0 + k * STEP, longitude=0.14 + 4 * k * STEP / 4.35e6))
+    assert window.is_open is believed
+
+
 def test_vertical_jumps_count_where_there_is_a_vertical_speed():
     window = TrustWindow()
     fly(window, 0.0, 4.0, v_d=0.0)
