@@ -49,7 +49,7 @@ def test_timing_that_is_asked_to_and_fro_ends_between(engine, monkeypatch):
     assert len(passes) <= 5 + MOST_IDLE < MOST_ROUNDS
 
 
-@pytest.mark.parametrize("apart", [0.2, 1.0])
+@pytest.mark.parametrize("apart", [0.2, 1.0, 1.4])
 def test_shapes_are_followed_where_fixes_are_as_near_as_is_looked_around_them(engine, apart):
     engine = again(engine)
     step = round(apart / float(np.median(np.diff(engine.batches[0].fixes.t))))
@@ -57,4 +57,4 @@ def test_shapes_are_followed_where_fixes_are_as_near_as_is_looked_around_them(en
     theta = engine.model.prior.copy()
     theta[[engine.model.index[name] for name in SHAPES]] = 0.3
     certain = np.diag(engine.model.prior_sigma**2)
-    assert engine.asked(theta, certain).shapes == ((0.3,) * 4 if apart < 0.5 else (0.0,) * 4)
+    assert engine.asked(theta, certain).shapes == ((0.3,) * 4 if apart < 1.2 else (0.0,) * 4)
