@@ -21,7 +21,7 @@ def test_a_revision_against_itself_is_the_same(tmp_path):
     # Of a folder that is new, loops would be compiled for half a minute: numpy does what they do.
     (head / "onboard" / "core" / "maths" / "compiler.py").write_text("raise ImportError\n")
     log = tmp_path / "short.tlog"
-    flown(log, "copter", 2, (), 60.0)
+    flown(log, "copter", 1, (), 45.0)
     found = against.compared(head, head, "replay", log, 2)
     assert found.answers.nothing
     assert len(found.before) == len(found.now) == 2

@@ -8,7 +8,6 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.challenge import Measured
-from benchmarks.matching import concealing
 from benchmarks.matching.adapter import MatchError, Said, said
 from benchmarks.matching.concealing import NAMES, UNSHOWN, Challenge, Secret
 from benchmarks.matching.runner import made, one, saturated
@@ -84,9 +83,7 @@ def test_what_has_no_name_must_not_be_called_clean():
     assert "1 of those outside the catalogue were called clean" in table([clean, wind])
 
 
-@pytest.fixture
-def short(monkeypatch):
-    monkeypatch.setattr(concealing, "DURATION_S", (55.0, 60.0))
+SHORT_S = (55.0, 60.0)
 
 
 def perfect(answer):
@@ -99,8 +96,8 @@ def perfect(answer):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["copter", "plane"])
-def test_the_answer_is_sealed_before_it_is_asked(vehicle, short, capsys):
-    secret = Secret(11, vehicle, "mixed", ("wind", "gps_latency"))
+def test_the_answer_is_sealed_before_it_is_asked(vehicle, capsys):
+    secret = Secret(11, vehicle, "mixed", ("wind", "gps_latency"), lasting_s=SHORT_S)
     flight, answer = made(secret)
     assert saturated(flight) < 5e-3
     order = []
@@ -119,11 +116,11 @@ def test_the_answer_is_sealed_before_it_is_asked(vehicle, short, capsys):
 
 
 @pytest.mark.slow
-def test_a_command_that_fails_is_no_answer(short):
+def test_a_command_that_fails_is_no_answer():
     def asked(path):
         raise MatchError("no such command")
 
-    outcome = one(Secret(12, "copter", "single", ("motor_lag",)), asked)
+    outcome = one(Secret(12, "copter", "single", ("motor_lag",), lasting_s=SHORT_S), asked)
     assert outcome.said is None
     assert not outcome.identified
     assert "no such command" in outcome.failure

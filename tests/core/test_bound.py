@@ -1,5 +1,6 @@
 """On a flight that is as the model says, claimed sigmas are those of the Cramer-Rao bound."""
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,17 @@ from benchmarks.matched import LEVELS, draw, path
 from benchmarks.recorded import error_of, fed
 
 
+@functools.cache
+def aloft(vehicle, duration):
+    """A trajectory, and the bound on it; flights draw their noise upon it and leave it as it is."""
+    flown = path(vehicle, duration=duration)
+    return flown, bound(flown)
+
+
 @pytest.fixture(
     scope="module",
     params=[
         ("copter", 90.0),
-        pytest.param(("copter", 160.0), marks=pytest.mark.slow),
         pytest.param(("plane", 160.0), marks=pytest.mark.slow),
     ],
     ids=lambda flight: "{}-{:.0f}s".format(*flight),
@@ -25,13 +32,12 @@ def planned(request):
 
 @pytest.fixture(scope="module")
 def flown(planned):
-    vehicle, duration = planned
-    return path(vehicle, duration=duration)
+    return aloft(*planned)[0]
 
 
 @pytest.fixture(scope="module")
-def whole(flown):
-    return bound(flown)
+def whole(planned):
+    return aloft(*planned)[1]
 
 
 @pytest.mark.slow
@@ -56,8 +62,8 @@ def test_claims_are_what_physics_allows(flown, whole):
 def test_claims_know_on_which_axis_the_force_is_shaken():
     """One level for all made z, which lift shakes, attenuated, and x and y the other way round."""
     shaken = replace(LEVELS, lift_walk=0.3)
-    flown = path("plane", duration=160.0)
-    limit, calm = bound(flown, shaken), bound(flown)
+    flown, calm = aloft("plane", 160.0)
+    limit = bound(flown, shaken)
     assert np.all(limit[[0, 1, 3, 4]] < 1.5 * calm[[0, 1, 3, 4]])
     off, claimed = [], []
     for seed in range(3, 7):

@@ -165,8 +165,16 @@ async def test_a_reboot_while_the_daemon_was_off_is_audited_at_its_start(documen
             assert not notices(again, "push_resumed")
 
 
-@pytest.mark.parametrize("push", [{}, {"policy": "never"}, {"approval": True}])
-@pytest.mark.parametrize("then", ["silence", "reboot", "restart"])
+@pytest.mark.parametrize(
+    ("then", "push"),
+    [
+        ("silence", {}),
+        ("reboot", {}),
+        ("restart", {}),
+        ("silence", {"policy": "never"}),
+        ("reboot", {"approval": True}),
+    ],
+)
 async def test_what_somebody_has_set_before_our_eyes_stays_whatever_comes(
     document, daemon, port, then, push
 ):

@@ -290,7 +290,7 @@ def test_numbers_that_are_none(tmp_path):
 @pytest.mark.slow
 @pytest.mark.recordings
 @pytest.mark.parametrize(
-    "name", ["sitl/a01.tlog", "sitl/c01.tlog", "sitl/c01.BIN", "real/real-quad-07.BIN",
+    "name", ["sitl/a01.tlog", "sitl/c01.BIN", "real/real-quad-07.BIN",
              "real/real-quad-12-gpsglitch.BIN", "real/real-quad-16-gaps.BIN"],
 )  # fmt: skip
 def test_recordings(recordings, monkeypatch, name):

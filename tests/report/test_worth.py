@@ -34,7 +34,7 @@ def flight(tmp_path, seed, *, dull):
 @pytest.mark.parametrize("dull", [False, True])
 def test_what_may_be_set_makes_the_force_better(tmp_path, dull):
     settable = 0
-    for seed in range(700, 706):
+    for seed in range(700, 704):
         path, truth = flight(tmp_path, seed, dull=dull)
         result = replay([path], Recorded())
         (c,), (advice,) = result.calibrations, result.advice
@@ -50,4 +50,4 @@ def test_what_may_be_set_makes_the_force_better(tmp_path, dull):
         # With what it claims to be left of the error, at three times its size.
         claimed = advice.plan.worth.error_after
         assert after < (3.0 * claimed) ** 2, seed
-    assert settable >= 3
+    assert settable >= 2

@@ -96,11 +96,6 @@ def test_what_is_constant_is_told_and_may_be_set(flown):
 
 CONCEALED = {
     "latency alternates": ("gps_latency", lambda s: later(s, lambda t: 0.15 * alternating(t))),
-    "latency steps": ("gps_latency", lambda s: later(s, lambda t: 0.12 * (t > 110.0))),
-    "antenna alternates": (
-        "gps_lever_arm",
-        lambda s: moving(s, lambda t: (0.4 * alternating(t), 0.0, 0.0)),
-    ),
     "antenna steps": ("gps_lever_arm", lambda s: moving(s, lambda t: (0.0, 0.4 * (t > 110), 0.0))),
 }
 

@@ -72,6 +72,7 @@ def test_each_fault_changes_the_receiver_alone(flight):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("flight", ["copter"], indirect=True)
 def test_step_glitch_and_gaps_in_one_flight(flight):
     span = moving_span(flight.samples)
     every = (STEP, GLITCH, GAPS)

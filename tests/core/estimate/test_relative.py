@@ -109,10 +109,10 @@ def test_white_residuals_are_not_inflated_and_wandering_ones_are():
 
 
 @pytest.mark.parametrize("wander", [0.0, 0.02])
-def test_sigmas_are_honest_over_two_hundred_flights(wander):
+def test_sigmas_are_honest_over_a_hundred_flights(wander):
     truth, rng = B.as_linear(), np.random.default_rng(9)
     mean, other = [], []
-    for _ in range(200):
+    for _ in range(100):
         found = pair(rng, seconds=140.0, wander=wander)
         left = found.difference(A.as_linear(), truth) - found.own
         mean.append(left / np.sqrt(np.diag(found.own_covariance)))

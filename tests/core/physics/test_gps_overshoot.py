@@ -94,10 +94,9 @@ def test_no_more_of_the_past_is_asked_for_than_there_is():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("vehicle", "hertz"), [("copter", 2.0), ("plane", 1.5)])
-def test_a_flight_that_conceals_it_is_explained_by_its_name(vehicle, hertz):
-    concealed = Concealed(square=(2.0 * math.pi * hertz) ** -2)
-    spec = Secret(641, vehicle, "control").spec()
+def test_a_flight_that_conceals_it_is_explained_by_its_name():
+    concealed = Concealed(square=(2.0 * math.pi * 2.0) ** -2)
+    spec = Secret(641, "copter", "control").spec()
     said = diagnose(heard(replace(spec, effects=(concealed,))), 1)
     assert [e.name for e in said.effects] == ["gps_overshoot"]
     found = said.effects[0].unknowns["square"]

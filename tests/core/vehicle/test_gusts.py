@@ -78,6 +78,7 @@ def test_an_unknown_that_gusts_do_not_touch_is_in_no_doubt():
 def test_gusts_alone_accuse_no_coefficient():
     match = matched(seed=41, gusts=0.5)
     assert told(match) == set()
+    assert match.explained
     assert match.wind is not None
     assert match.wind.turbulence_rms > 0.3
 
@@ -100,17 +101,16 @@ def test_thrust_is_found_in_gusts():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("c_lift_0", [0.36, 0.76])
-def test_lift_is_found_in_gusts_by_its_mean(c_lift_0):
-    match = matched(seed=46, gusts=0.5, c_lift_0=c_lift_0)
+def test_lift_is_found_in_gusts_by_its_mean():
+    match = matched(seed=46, gusts=0.5, c_lift_0=0.36)
     assert told(match) == {"lift"}
     constant, slope = (match.numbers[f"lift.{key}"] for key in ("c_lift_0", "c_lift_a"))
-    assert abs(constant.real - c_lift_0) < 3.0 * constant.sigma
+    assert abs(constant.real - 0.36) < 3.0 * constant.sigma
     assert abs(slope.real - 6.9) < 3.0 * slope.sigma
     # How much of it is the slope's the gusts hide, and the mean lift is known all the same.
     assert slope.sigma > 1.0
     mean = constant.real - 0.03 * slope.real
-    assert mean == pytest.approx(c_lift_0 - 0.03 * 6.9, abs=0.06)
+    assert mean == pytest.approx(0.36 - 0.03 * 6.9, abs=0.06)
 
 
 @pytest.mark.slow
@@ -149,13 +149,13 @@ def test_a_lift_between_nothing_and_what_can_be_named_is_not_called_explained():
     assert "gusts" in next(n.why for n in match.not_testable if n.name == "lift")
 
 
-@pytest.mark.parametrize(("beside", "explained"), [(0.0, True), (8.0, False)])
-def test_gusts_explain_no_more_than_gusts_of_their_size_do(beside, explained):
+@pytest.mark.slow
+def test_gusts_explain_no_more_than_gusts_of_their_size_do():
     """A force to the side that wanders, thrice what gusts of 0.8 m/s make of it."""
     flight = plane_flight(reading=1.0, gusts=0.8, seed=3)
-    force = beside * smooth(np.random.default_rng(1), len(flight), 1.0)
+    force = 8.0 * smooth(np.random.default_rng(1), len(flight), 1.0)
     f_b = flight.f_b + force[:, None] * (0.0, 1.0, 0.0)
     match = match_plane(replace(flight, f_b=f_b), PlaneAirframe(), SIGMA)
     assert match is not None
     assert {d.name for d in match.effects} == {"turbulence"}
-    assert match.explained is explained
+    assert not match.explained

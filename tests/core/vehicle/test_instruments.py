@@ -112,11 +112,11 @@ def test_a_tilt_that_answers_gusts_takes_nothing_off_the_drag():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gust", [0.1, 0.2, 0.8])
+@pytest.mark.parametrize("gust", [0.1, 0.8])
 def test_gusts_have_their_size_and_are_answered_whether_they_are_named_or_not(gust):
     """Answers to gusts too small to be told from errors of the velocity bend the thrust as much."""
     sizes = []
-    for seed in range(3, 6):
+    for seed in range(3, 5):
         match = match_copter(leaning_flight(seed, gust=gust), COPTER, CopterAirframe(), SIGMA)
         named = {d.name for d in match.effects}
         assert named == ({"wind"} if gust < 0.15 else {"wind", "turbulence"})
@@ -124,7 +124,7 @@ def test_gusts_have_their_size_and_are_answered_whether_they_are_named_or_not(gu
         if match.wind is not None and match.wind.turbulence_rms is not None:
             sizes.append(match.wind.turbulence_rms)
     if sizes:
-        # Three flights of 80 gusts along two axes.
+        # Flights of 80 gusts along two axes.
         assert abs(np.mean(sizes) / gust - 1.0) < 4.0 / np.sqrt(2 * 2 * 80 * len(sizes)) + 0.05
 
 

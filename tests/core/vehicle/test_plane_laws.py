@@ -56,11 +56,11 @@ def test_an_airspeed_that_is_off_by_as_much_at_every_speed_has_no_other_scale():
     assert not match.explained
 
 
-@pytest.mark.parametrize("seed", [51, 52, 53])
-@pytest.mark.parametrize("reading", [None, 1.0])
+@pytest.mark.parametrize(("seed", "reading"), [(52, None), (51, 1.0)])
 def test_gusts_repeat_with_nothing_that_a_plane_does(seed, reading):
     match = matched(plane_flight(seed=seed, wind=(3.0, 1.0), gusts=0.5, reading=reading))
     assert "repeats" not in match.note
+    assert "the wind became another" not in match.note
     assert not {"lift", "side_force"} & names(match)
     for effect in match.effects:
         if effect.name == "turbulence" and reading is None:

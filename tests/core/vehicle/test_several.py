@@ -140,15 +140,13 @@ def test_what_is_far_from_the_model_is_far_in_its_own_flight():
 @pytest.mark.slow
 def test_flights_that_do_not_agree_on_a_number_tell_it_no_better_than_they_agree():
     """A drag of the rotors that differs from flight to flight by 7 %: another load."""
-    rng, off = np.random.default_rng(5), []
-    for trial in range(3):
-        own = 0.45 + 0.03 * rng.standard_normal(7)
-        winds = 3.0 * rng.standard_normal((7, 2))
-        every = [
-            copter_flight(seed=100 * trial + k, seconds=70.0, wind=wind, c_m=c_m, noise=0.05)
-            for k, (c_m, wind) in enumerate(zip(own, winds, strict=True))
-        ]
-        found = matched(every).numbers["rotor_drag.mcoef"]
-        assert 0.5 < found.sigma / (0.03 / np.sqrt(7.0)) < 2.0
-        off.append((found.real - 0.45) / found.sigma)
-    assert max(map(abs, off)) < 3.0
+    rng = np.random.default_rng(5)
+    own, winds = 0.45 + 0.03 * rng.standard_normal(7), 3.0 * rng.standard_normal((7, 2))
+    every = [
+        copter_flight(seed=k, seconds=70.0, wind=wind, c_m=c_m, noise=0.05)
+        for k, (c_m, wind) in enumerate(zip(own, winds, strict=True))
+    ]
+    found = matched(every).numbers["rotor_drag.mcoef"]
+    assert 0.5 < found.sigma / (0.03 / np.sqrt(7.0)) < 2.0
+    # Of right sigmas one trial in 125 is further off.
+    assert abs(found.real - 0.45) < 2.65 * found.sigma
