@@ -83,7 +83,9 @@ class SteadyHeading:
             for k, (pulled, samples) in enumerate(zip(of, at, strict=True))
         )
         back = before - self._right
-        return [*(_turned(b, back[:1], back[1:]) for b in run), _turned(batch, off, throttle)]
+        # Nearly always nothing is: of each batch of hours it need not be asked whenever one comes.
+        steady = [_turned(b, back[:1], back[1:]) for b in run] if back.any() else run
+        return [*steady, _turned(batch, off, throttle)]
 
     def _right_until(self, last: float) -> Array:
         """What heading and throttle were pulled by for most of the time."""
