@@ -311,12 +311,11 @@ class Chronicle:
         return Curve(t, both[0]), Curve(t, both[1])
 
     def _innovation(self, engine: Engine) -> Curve:
-        states = list(engine.states)
+        t, size = engine.states.t, np.linalg.norm(np.nan_to_num(engine.states.innovation), axis=1)
         times, lengths = [np.zeros(0)], [np.zeros(0)]
-        for piece, run in self._runs([s.t for s in states]):
-            times.append(piece.time(np.array([s.t for s in states[run]])))
-            residual = np.nan_to_num(np.array([s.innovation for s in states[run]]))
-            lengths.append(np.linalg.norm(residual, axis=1))
+        for piece, run in self._runs(t.tolist()):
+            times.append(piece.time(t[run]))
+            lengths.append(size[run])
         return Curve(np.concatenate(times), np.concatenate(lengths))
 
     def _runs(self, times: list[float]) -> list[tuple[_Piece, slice]]:

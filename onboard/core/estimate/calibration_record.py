@@ -311,12 +311,10 @@ def judged_by(made: Calibration, engine: Engine, in_force: SixParameters) -> Cal
 
 
 def _certificate(engine: Engine) -> Certificate | None:
-    states = list(engine.states)
-    if len(states) < 2:
+    if len(engine.states) < 2:
         return None
-    t = np.array([s.t for s in states])
-    residual = np.array([s.innovation for s in states])
-    residual = np.where(np.isnan(residual), 0.0, residual)
+    t = engine.states.t
+    residual = np.nan_to_num(engine.states.innovation)
     # A reboot or another file sets the clock back: windows of their own, on a clock that goes on.
     back = np.flatnonzero(np.diff(t) <= 0.0) + 1
     for i in back:

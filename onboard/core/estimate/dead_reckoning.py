@@ -25,7 +25,7 @@ from onboard.core.estimate.limits import (
 from onboard.core.filter.traces import EpochState
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning
+from onboard.core.maths.earth import STANDARD_GRAVITY, carried_and_turning_of
 from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.small_turns import turn_by
 from onboard.core.model.linearisation import Linearisation
@@ -285,24 +285,23 @@ def _errors(
     R = state.R_nb
     sets = np.array(sixes)
     gained = chain.by_scale @ sets[:, :3].T + chain.by_offset @ sets[:, 3:].T
-    v = np.tile(state.v_n, (len(sets), 1))
+    v = [state.v_n.tolist()] * len(sets)
     every = np.empty((len(sets), len(chain), 3))
     times = zip(chain.start.tolist(), chain.end.tolist(), chain.latitude.tolist(), strict=True)
     for k, (start, end, latitude) in enumerate(times):
         T = end - start
-        turning = np.zeros(3)
-        push = (R @ gained[k]).T
-        for i in range(len(sets)):
-            coriolis, turning = carried_and_turning(latitude, v[i])
-            push[i] += coriolis * T
-        push[:, 2] += STANDARD_GRAVITY * T
-        v += push
+        for i, push in enumerate((R @ gained[k]).T.tolist()):
+            coriolis, turning = carried_and_turning_of(latitude, *v[i])
+            pulled = 0.0, 0.0, STANDARD_GRAVITY * T
+            v[i] = [
+                x + (p + c * T + g) for x, p, c, g in zip(v[i], push, coriolis, pulled, strict=True)
+            ]
         every[:, k] = v
         at_end = attitude.get(round(end, 3))
         if at_end is None:
             # The bias turns the interval's increments by R(-b T) to first order.
             off = rotation_from_vector(-state.bias_b * T)
-            at_end = turn_by(-turning * T) @ R @ chain.turn[k] @ off
+            at_end = turn_by(-np.array(turning) * T) @ R @ chain.turn[k] @ off
         R = at_end
     seen = np.isfinite(chain.velocity)
     error: Array = np.where(seen, every - chain.velocity, 0.0)

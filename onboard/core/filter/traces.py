@@ -69,6 +69,16 @@ class StateLog:
     def __len__(self) -> int:
         return sum(map(len, self._parts))
 
+    @property
+    def t(self) -> Array:
+        """(n,) times of all of them, s: no objects are made for these alone."""
+        return np.concatenate([np.zeros(0), *(rows[:, 0] for rows in self._parts)])
+
+    @property
+    def innovation(self) -> Array:
+        """(n, 3) their velocity innovations, m/s."""
+        return np.concatenate([np.zeros((0, 3)), *(rows[:, 1:4] for rows in self._parts)])
+
     def __iter__(self) -> Iterator[EpochState]:
         for rows in self._parts:
             for row in rows:

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Vector3
 
 SEMI_MAJOR_AXIS: Final = 6378137.0
 """a, m (TR8350.2 table 3.1)."""
@@ -98,10 +98,17 @@ def carried_and_turning(latitude: float, v_n: Array) -> tuple[Array, Array]:
     Returns:
         (3,) m/s^2 and (3,) rad/s, both in NED.
     """
-    north, east, down = v_n.tolist()
+    carried, turning = carried_and_turning_of(latitude, *v_n.tolist())
+    return np.array(carried), np.array(turning)
+
+
+def carried_and_turning_of(
+    latitude: float, north: float, east: float, down: float
+) -> tuple[Vector3, Vector3]:
+    """The same of plain numbers: in a row of thousands, arrays are most of what it takes."""
     c, s = math.cos(latitude), math.sin(latitude)
     # A sphere's radius does: half a per cent of 1e-6 rad/s.
     w = (east / SEMI_MAJOR_AXIS, -north / SEMI_MAJOR_AXIS, -east * s / c / SEMI_MAJOR_AXIS)
     x, y, z = 2.0 * EARTH_RATE * c + w[0], w[1], -2.0 * EARTH_RATE * s + w[2]
-    carried = np.array([z * east - y * down, x * down - z * north, y * north - x * east])
-    return carried, np.array([EARTH_RATE * c + w[0], w[1], -EARTH_RATE * s + w[2]])
+    carried = z * east - y * down, x * down - z * north, y * north - x * east
+    return carried, (EARTH_RATE * c + w[0], w[1], -EARTH_RATE * s + w[2])

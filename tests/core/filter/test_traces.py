@@ -32,8 +32,12 @@ def test_states_come_back_in_order():
         assert a.t == b.t
         for name in ("innovation", "R_nb", "v_n", "bias_b"):
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    np.testing.assert_array_equal(log.t, [x.t for x in kept])
+    np.testing.assert_array_equal(log.innovation, [x.innovation for x in kept])
     log.clear()
     assert not list(log)
+    assert log.t.shape == (0,)
+    assert log.innovation.shape == (0, 3)
 
 
 def test_the_latest_are_kept_and_never_fewer_than_asked_for():
