@@ -66,7 +66,9 @@ def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, object]:
 
     ArduPilot's own simulator is another process, with a time of its own.
     """
-    if item.get_closest_marker("virtual_time") and item.config.getoption("sitl") == "builtin":
+    marker = item.get_closest_marker("virtual_time")
+    # Of a real autopilot's process nobody can make the time jump; ``always`` flies none.
+    if marker and (item.config.getoption("sitl") == "builtin" or marker.kwargs.get("always")):
         return {"virtual": VirtualTimeLoop}
     return {"real": asyncio.new_event_loop}
 

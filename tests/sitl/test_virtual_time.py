@@ -8,7 +8,7 @@ import pytest
 from tests.mavlink.virtual_time import virtual_time
 
 HOUR_S = 3600.0
-pytestmark = pytest.mark.virtual_time
+pytestmark = pytest.mark.virtual_time(always=True)
 
 
 async def test_sleeping_takes_no_time_but_the_loops():
