@@ -28,6 +28,8 @@ DELAY_RANGE_S: Final = (-0.1, 0.45)
 """Latency of GPS, s: a little before the stamp, or as late as no known receiver is [tuned]."""
 REACH_MARGINS_S: Final = (0.13, 0.08)
 """s; by which samples reach further back and ahead than that [cost]."""
+PAST_MARGIN_S: Final = 0.01
+"""s; by which they have to go on past what is around the last fix of a piece [cost]."""
 EVEN_MARGIN_S: Final = 0.1
 """s; by which they are taken from earlier still, for even times move a little [cost]."""
 KEPT_S: Final = 0.3

@@ -15,6 +15,7 @@ from onboard.core.inputs.limits import (
     AROUND_S,
     AROUND_SLOW_S,
     DELAY_RANGE_S,
+    PAST_MARGIN_S,
     REACH_MARGINS_S,
     RESOLVED_ENDS_S,
 )
@@ -45,7 +46,7 @@ class Reach:
     @property
     def after(self) -> float:
         """Without which after the last fix of a piece nothing of it is taken, s."""
-        return self.around + 0.01
+        return self.around + PAST_MARGIN_S
 
     @property
     def longest_window(self) -> float:

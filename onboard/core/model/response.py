@@ -11,6 +11,8 @@ fro, and scale and offset of z were up to five sigma off.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -69,11 +71,11 @@ class Response:
         """
         step = velocity.step
         self.apart = min(middle(np.diff(t)), reach) if len(t) > 1 else 0.0
-        shapes = _less_even(window, self.apart, step)
+        shapes = _velocities(window, self.apart, step)
         shaped = _shared(shares, shapes)
         force = mean(window, step) + change(shaped, LATER_S)
         along = slope(window, 2.0 * reach, step)
-        places = _less_even_place(window, self.apart)
+        places = _places(window, self.apart)
         place = averaged_place(window) + _shared(shares, places)
         seen = velocity.seen(t, [*shapes, *places, shaped, force, along, place], window)
         self.shapes: Array = seen[: len(SHAPES)]
@@ -82,37 +84,36 @@ class Response:
         if shaped and window >= RESOLVED_S:
             widths = (1.0 + WIDER) * window, (1.0 - WIDER) * window
             shares_wide, shares_narrow = (
-                velocity.seen(t, [_shared(shares, _less_even(width, self.apart, step))], width)[0]
+                velocity.seen(t, [_shared(shares, _velocities(width, self.apart, step))], width)[0]
                 for width in widths
             )
             self.slope += (shares_wide - shares_narrow) / (widths[0] ** 2 - widths[1] ** 2)
 
 
-def _less_even(window: float, apart: float, step: float) -> list[Combination]:
+def _velocities(window: float, apart: float, step: float) -> list[Combination]:
     """The four shapes less the even mean over ``window``, s, of epochs ``apart``, s."""
-    less = weight_of_two(window, apart)
-    if less <= 0.0:
-        return [()] * len(SHAPES)
-    less_even = times(-1.0, averaged(window, step))
-    return [
-        paired(window, less) + less_even,
-        paired(window, 1.0 - less) + less_even,
-        times(0.5, paired(window, 0.25)) + times(-0.5, paired(window, 0.75)),
-        lagged(window) + less_even,
-    ]
+    even, late = averaged(window, step), lagged(window)
+    return _less_even(even, partial(paired, window), late, weight_of_two(window, apart))
 
 
-def _less_even_place(window: float, apart: float) -> list[Combination]:
+def _places(window: float, apart: float) -> list[Combination]:
     """The same of the place."""
-    less = weight_of_two(window, apart)
+    even, late = averaged_place(window), lagged_place(window)
+    return _less_even(even, partial(paired_place, window), late, weight_of_two(window, apart))
+
+
+def _less_even(
+    even: Combination, pair: Callable[[float], Combination], late: Combination, less: float
+) -> list[Combination]:
+    """Two moments, of which the older weighs ``less`` or so much more, and a lag, less ``even``."""
     if less <= 0.0:
         return [()] * len(SHAPES)
-    less_even = times(-1.0, averaged_place(window))
+    less_even = times(-1.0, even)
     return [
-        paired_place(window, less) + less_even,
-        paired_place(window, 1.0 - less) + less_even,
-        times(0.5, paired_place(window, 0.25)) + times(-0.5, paired_place(window, 0.75)),
-        lagged_place(window) + less_even,
+        pair(less) + less_even,
+        pair(1.0 - less) + less_even,
+        times(0.5, pair(0.25)) + times(-0.5, pair(0.75)),
+        late + less_even,
     ]
 
 
