@@ -95,7 +95,7 @@ def possible(
         (point.attitude_delay, *ATTITUDE_DELAY_RANGE_S),
         (point.heading, *HEADING_RANGE_RAD),
         *zip(
-            point.shapes, *(SHAPE_RANGE if reach.tells(apart) else 2 * (point.shapes,)), strict=True
+            point.shapes, *(SHAPE_RANGE if FAR.tells(apart) else 2 * (point.shapes,)), strict=True
         ),
     )
     for name, (now, least, most) in zip(MOVING, ranges, strict=True):
@@ -221,7 +221,7 @@ def beyond_range(
         longer = name == "window_squared" and asked + SHORTER * sigma > reach.around**2
         if asked < low - BEYOND * sigma or asked > high + BEYOND * sigma:
             out.append(f"{words} would have to be further off than can be told")
-        elif longer and not reach.tells(apart):
+        elif longer and not FAR.tells(apart):
             out.append(f"so few fixes may be averages over more than {reach.around:.1f} s")
     return out + [
         f"{name} would have to be the other way round than it can be"

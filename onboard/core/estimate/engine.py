@@ -39,7 +39,7 @@ from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
 from onboard.core.filter.whitening import Uses
-from onboard.core.inputs.reach import reach_of
+from onboard.core.inputs.reach import FAR
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.steady_heading import SteadyHeading
 from onboard.core.maths.arrays import Array
@@ -152,7 +152,7 @@ class Engine(Watched):
         out = theta.copy()
         # Of fixes further apart than is looked around them, shares of what is an epoch apart stand
         # for something else: they are not followed.
-        kept = () if reach_of(self.apart).tells(self.apart) else SHAPES
+        kept = () if FAR.tells(self.apart) else SHAPES
         for name in (*MOVING, "clock_rate"):
             if name in self.model.index and name not in kept:
                 out[self.model.index[name]] = 0.0

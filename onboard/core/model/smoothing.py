@@ -101,7 +101,7 @@ def paired(window: float, older: float = 0.5) -> Combination:
     return both + times(-1.0, NOW)
 
 
-def paired_place(window: float, older: float = 0.5) -> Combination:
+def paired_place(window: float, older: float) -> Combination:
     """``mean(X) - X`` of the moments of :func:`paired`, m."""
     return tuple((shift, 0.0, weight, 0.0) for shift, weight, _, _ in paired(window, older))
 
