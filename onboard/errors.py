@@ -35,7 +35,17 @@ class ExtraError(UsageError):
 
 
 class LinkError(OnboardError):
-    """The link or the autopilot failed: no heartbeat, port in use, connection refused."""
+    """The link or the autopilot failed: no heartbeat, connection refused."""
+
+    exit_status = 3
+
+
+class UnavailableError(OnboardError):
+    """Another program has it, or it is not there for us yet: worth another try later.
+
+    A port, an address or a serial device: while a machine starts, or a service is replaced, each
+    of them may be somebody else's for seconds.
+    """
 
     exit_status = 3
 
@@ -56,6 +66,12 @@ class DiskError(StateError):
     """The disk is full, read-only or failing: what it does not do now it may do again later."""
 
 
+class HeldError(StateError):
+    """Another process has the state directory: a service that is still ending, perhaps."""
+
+    exit_status = 3
+
+
 def disk_error(path: Path, error: OSError) -> StateError:
     """What the disk said of a file, as one of ours: a :class:`DiskError` if it is the disk's fault.
 
@@ -71,6 +87,8 @@ class RefusedError(OnboardError):
     exit_status = 2
 
 
+NOT_OURS = frozenset({errno.EADDRINUSE, errno.EADDRNOTAVAIL})
+"""What a socket says of an address that is another program's, or none of this machine's (yet)."""
 _OF_THE_DISK = frozenset(
     {errno.EIO, errno.ENOSPC, errno.EROFS, errno.EDQUOT, errno.ENXIO, errno.ENODEV, errno.ESTALE}
 )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from onboard.errors import OnboardError
+from onboard.errors import HeldError, OnboardError, UnavailableError
 
 INTERRUPTED = 130
 
@@ -92,6 +92,8 @@ def run(
     try:
         with asyncio.Runner(loop_factory=MeteredLoop) as runner:
             stopped_by = runner.run(_serve(chosen, starts))
+    except (UnavailableError, HeldError):
+        raise  # at once: the next start may be too early as well
     except (OnboardError, KeyboardInterrupt):
         starts.over()  # it has said why
         raise

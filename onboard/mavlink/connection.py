@@ -7,6 +7,7 @@ import random
 from collections.abc import Callable, Iterator
 from enum import Enum
 
+from onboard.errors import UnavailableError
 from onboard.mavlink import limits
 from onboard.mavlink.codec import Codec, CodecStatistics, Frame
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
@@ -173,6 +174,7 @@ class Connection:
 
         Raises:
             EndpointError: the endpoint cannot be opened at all (not once it has been up).
+            UnavailableError: nor now, for it is another program's (nor that).
         """
         try:
             while True:
@@ -197,7 +199,7 @@ class Connection:
                 linger=self._linger,
                 first=self.peers.is_vehicle,
             )
-        except EndpointError as error:
+        except (EndpointError, UnavailableError) as error:
             if not self.connects:
                 raise
             return str(error)

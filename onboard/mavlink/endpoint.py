@@ -19,7 +19,7 @@ BAUD_RATES: dict[int, int] = {
 
 
 class EndpointError(UsageError):
-    """An endpoint that cannot be opened as asked: port in use, no such address, no permission."""
+    """An endpoint that cannot be opened as asked: no serial device, a port that is not allowed."""
 
 
 class EndpointKind(Enum):

@@ -168,7 +168,8 @@ class Link:
         """Keep the link until :meth:`close` or cancellation.
 
         Raises:
-            EndpointError: an endpoint cannot be opened at all (port in use, no permission).
+            EndpointError: an endpoint cannot be opened at all.
+            UnavailableError: nor now, for it is another program's.
             Exception: whatever a handler raised.
         """
         self._stopped = asyncio.get_running_loop().create_future()

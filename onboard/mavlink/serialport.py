@@ -7,6 +7,7 @@ import fcntl
 import os
 import termios
 
+from onboard.errors import UnavailableError
 from onboard.mavlink.endpoint import BAUD_RATES, Endpoint, EndpointError
 
 
@@ -17,7 +18,8 @@ def open_serial(endpoint: Endpoint) -> int:
     with RTS/CTS works without it as long as we read fast enough, and we do.
 
     Raises:
-        EndpointError: not a terminal device, or another program has it open.
+        EndpointError: not a terminal device.
+        UnavailableError: another program has it open, or we may not (perhaps not yet: udev).
         OSError: the device is not there (perhaps not yet: USB).
     """
     try:
@@ -25,19 +27,19 @@ def open_serial(endpoint: Endpoint) -> int:
             endpoint.device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC
         )
     except PermissionError:
-        raise EndpointError(
+        raise UnavailableError(
             f"{endpoint}: no permission to open it (is the user in the group of the device?)"
         ) from None
     except OSError as error:
         if error.errno == errno.EBUSY:
-            raise EndpointError(f"{endpoint}: port in use by another program") from None
+            raise UnavailableError(f"{endpoint}: port in use by another program") from None
         raise
     try:
         try:
             # TIOCEXCL does not hold root off; the lock does, among programs that take it.
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise EndpointError(f"{endpoint}: port in use by another program") from None
+            raise UnavailableError(f"{endpoint}: port in use by another program") from None
         _configure(descriptor, BAUD_RATES[endpoint.baud])
         fcntl.ioctl(descriptor, termios.TIOCEXCL)
     except termios.error as error:

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
 
+from onboard.errors import NOT_OURS, UnavailableError
 from onboard.mavlink import limits
 from onboard.mavlink.endpoint import Endpoint, EndpointError, EndpointKind
 from onboard.mavlink.pace import Pace
@@ -23,7 +24,7 @@ from onboard.mavlink.peers import Address
 from onboard.mavlink.serialport import open_serial
 from onboard.mavlink.waiting import Waiting
 
-UNUSABLE = (errno.EADDRINUSE, errno.EADDRNOTAVAIL, errno.EACCES, errno.EPERM)
+FORBIDDEN = (errno.EACCES, errno.EPERM)
 
 Receive = Callable[[bytes, Address | None], None]
 Lost = Callable[[str], None]
@@ -76,7 +77,8 @@ async def open_transport(
         first: whether what an address sent to a listening socket goes before what others sent.
 
     Raises:
-        EndpointError: port in use, no such local address, or no permission.
+        EndpointError: no permission, or no serial device.
+        UnavailableError: port in use, or no such local address (yet).
         OSError: the peer or device is not there (now): worth another try.
     """
     if endpoint.kind is EndpointKind.SERIAL:
@@ -104,9 +106,13 @@ async def open_transport(
             return DatagramTransport(sock, receive, linger)
         except OSError as error:
             sock.close()
-            if endpoint.kind is not EndpointKind.TCP and error.errno in UNUSABLE:
+            if endpoint.kind is EndpointKind.TCP:
+                raise
+            if error.errno in NOT_OURS:
                 what = "port in use" if error.errno == errno.EADDRINUSE else error.strerror
-                raise EndpointError(f"{endpoint}: {what}") from None
+                raise UnavailableError(f"{endpoint}: {what}") from None
+            if error.errno in FORBIDDEN:
+                raise EndpointError(f"{endpoint}: {error.strerror}") from None
             raise
         except BaseException:
             sock.close()

@@ -11,7 +11,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from onboard.errors import StateError, disk_error
+from onboard.errors import HeldError, StateError, disk_error
 
 LARGEST = 64_000_000
 """bytes; compaction keeps the file near a megabyte [bound]."""
@@ -122,7 +122,7 @@ class JournalFile:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             os.close(fd)
-            raise StateError(f"{self.path}: in use by another process") from None
+            raise HeldError(f"{self.path}: in use by another process") from None
         self._fd = fd
         if os.fstat(fd).st_size > LARGEST:
             self.close()

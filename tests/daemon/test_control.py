@@ -12,7 +12,7 @@ from onboard.daemon.outlets.control import ControlServer
 from onboard.daemon.outlets.door import Door, bound
 from onboard.daemon.outlets.limits import VIEWERS_MAX
 from onboard.daemon.view.snapshot import Snapshot
-from onboard.errors import ConfigurationError, RefusedError
+from onboard.errors import RefusedError, UnavailableError
 from tests.daemon.blank_snapshot import blank_snapshot
 from tests.daemon.daemons import until
 
@@ -269,7 +269,7 @@ def a_door(actions, port=0):
 async def test_a_taken_port_is_one_line():
     with bound("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(ConfigurationError, match=rf"\[http\] 127.0.0.1:{port}: .*in use"):
+        with pytest.raises(UnavailableError, match=rf"\[http\] 127.0.0.1:{port}: .*in use"):
             a_door(Recorded(), port).listen()
 
 

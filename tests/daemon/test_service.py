@@ -8,7 +8,12 @@ import socket
 import pytest
 
 from onboard.daemon.view.snapshot import Snapshot
-from onboard.errors import ConfigurationError, LinkError, OnboardError, StateError
+from onboard.errors import (
+    HeldError,
+    LinkError,
+    OnboardError,
+    UnavailableError,
+)
 from tests.daemon.daemons import made, until
 from tests.daemon.standing_vehicle import Vehicle
 
@@ -22,27 +27,29 @@ async def test_no_heartbeat_in_the_time_limit_is_a_link_error(document, port):
     assert caught.value.exit_status == 3
 
 
-async def test_a_taken_udp_port_is_one_line_and_exit_2(document, port):
+async def test_a_taken_udp_port_is_one_line_and_worth_another_try(document, port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port))
         with pytest.raises(OnboardError, match=f"{port}: port in use") as caught:
             await made(document).run()
-    assert caught.value.exit_status == 2
+    assert caught.value.exit_status == 3
 
 
 async def test_a_taken_http_port_is_one_line_and_leaves_nothing_behind(document, port):
     with socket.create_server(("127.0.0.1", 0)) as other:
         document["http"]["port"] = other.getsockname()[1]
-        with pytest.raises(ConfigurationError, match=r"\[http\].*in use"):
+        with pytest.raises(UnavailableError, match=r"\[http\].*in use") as caught:
             await made(document).run()
+    assert caught.value.exit_status == 3
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", port))
 
 
 async def test_two_daemons_do_not_share_a_state_directory(document, daemon):
     async with daemon(document):
-        with pytest.raises(StateError, match="in use"):
+        with pytest.raises(HeldError, match="in use") as caught:
             made(document)
+    assert caught.value.exit_status == 3
 
 
 async def test_it_reads_the_parameters_and_shows_who_is_there(document, daemon, port):

@@ -12,7 +12,7 @@ from onboard.cli.main import run
 from onboard.daemon.process import service as process
 from onboard.daemon.process.limits import LONGEST_WAIT_S, STARTS_AT_ONCE
 from onboard.daemon.process.starts import FILE, Starts, waiting
-from onboard.errors import LinkError
+from onboard.errors import HeldError, LinkError, UnavailableError
 
 
 @pytest.fixture
@@ -66,12 +66,22 @@ def test_waits_grow_from_none_to_the_longest_and_stay_there():
     assert sum(w == 0.0 for w in waits) == STARTS_AT_ONCE
 
 
+WAITED = [4.0, 8.0, 16.0, LONGEST_WAIT_S, LONGEST_WAIT_S]
+
+
 def test_a_service_that_crashes_at_each_start_waits_longer_each_time(ends, start, slept):
     ends(RuntimeError("a fault of ours"))
     for _ in range(7):
         with pytest.raises(RuntimeError):
             start()
-    assert slept == [4.0, 8.0, 16.0, LONGEST_WAIT_S, LONGEST_WAIT_S]
+    assert slept == WAITED
+
+
+@pytest.mark.parametrize("kind", [UnavailableError, HeldError])
+def test_so_does_one_whose_port_or_directory_is_somebody_elses(ends, start, slept, kind):
+    ends(kind("port in use"))
+    assert [start() for _ in range(7)] == [3] * 7
+    assert slept == WAITED
 
 
 @pytest.mark.parametrize("how", [None, LinkError("no heartbeat")], ids=["stopped", "said why"])

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import pytest
 
+from onboard.errors import UnavailableError
 from onboard.mavlink.connection import (
     TRANSITIONS,
     Backoff,
@@ -142,16 +143,18 @@ class TestConnection:
             assert [t.endpoint for t in air.transports] == [TCP, UDP, TCP]
 
     @virtual_time
-    async def test_what_cannot_be_opened_at_all_ends_the_link(self, air):
-        air.failures = [EndpointError(f"{UDP}: port in use")]
+    @pytest.mark.parametrize("kind", [EndpointError, UnavailableError])
+    async def test_what_cannot_be_opened_at_all_ends_the_link(self, air, kind):
+        air.failures = [kind(f"{UDP}: no port for us")]
         link = Link([UDP], clock=asyncio.get_running_loop().time)
-        with pytest.raises(EndpointError, match="port in use"):
+        with pytest.raises(kind, match="no port for us"):
             await link.run()
 
     @virtual_time
-    async def test_once_up_even_that_is_tried_again(self, air):
+    @pytest.mark.parametrize("kind", [EndpointError, UnavailableError])
+    async def test_once_up_even_that_is_tried_again(self, air, kind):
         async with running(TCP) as link:
-            air.failures = [EndpointError("no permission while udev sets the device up")]
+            air.failures = [kind("no permission while udev sets the device up")]
             air.transports[0].lost("unplugged")
             await asyncio.sleep(20.0)
             assert link.connections[0].is_up

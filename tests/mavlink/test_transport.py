@@ -10,6 +10,7 @@ from typing import Self
 
 import pytest
 
+from onboard.errors import UnavailableError
 from onboard.mavlink.endpoint import Endpoint, EndpointError
 from onboard.mavlink.limits import WRITE_LIMIT
 from onboard.mavlink.transport import open_transport
@@ -174,14 +175,14 @@ async def test_a_port_in_use_is_named():
     taken = udp_socket()
     endpoint = Endpoint.parse(f"udpin:127.0.0.1:{taken.getsockname()[1]}")
     inbox = Inbox()
-    with pytest.raises(EndpointError, match=f"^{endpoint}: port in use$"):
+    with pytest.raises(UnavailableError, match=f"^{endpoint}: port in use$"):
         await open_transport(endpoint, inbox.receive, inbox.lost)
     taken.close()
 
 
 async def test_an_address_that_is_not_ours_is_named():
     inbox = Inbox()
-    with pytest.raises(EndpointError, match=r"udpin:192\.0\.2\.1:14550: "):
+    with pytest.raises(UnavailableError, match=r"udpin:192\.0\.2\.1:14550: "):
         await open_transport(Endpoint.parse("udpin:192.0.2.1:14550"), inbox.receive, inbox.lost)
 
 
@@ -282,7 +283,7 @@ async def test_serial_ports_are_held_alone():
     endpoint = Endpoint.parse(f"serial:{os.ttyname(slave)}:57600")
     inbox = Inbox()
     transport = await open_transport(endpoint, inbox.receive, inbox.lost)
-    with pytest.raises(EndpointError, match="port in use by another program"):
+    with pytest.raises(UnavailableError, match="port in use by another program"):
         await open_transport(endpoint, inbox.receive, inbox.lost)
     transport.close()
     again = await open_transport(endpoint, inbox.receive, inbox.lost)

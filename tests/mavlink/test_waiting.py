@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from onboard.errors import UnavailableError
 from onboard.mavlink import limits
-from onboard.mavlink.endpoint import Endpoint, EndpointError
+from onboard.mavlink.endpoint import Endpoint
 from onboard.mavlink.transport import line_of_its_own, open_transport
 from onboard.mavlink.waiting import Waiting
 from tests.mavlink.test_hostile_bytes import Turns
@@ -147,7 +148,7 @@ async def test_a_transport_keeps_the_vehicles_bytes_in_a_flood_and_lets_go_of_bo
         while len(heard[first]) < len(sent):
             await turns.until(sum(turns.sizes) + 1)
         assert heard[first] == sent
-        with pytest.raises(EndpointError):
+        with pytest.raises(UnavailableError):
             await open_transport(Endpoint.parse(f"udpin:127.0.0.1:{to[1]}"), receive, turns.lost)
         transport.close()
         again = await open_transport(

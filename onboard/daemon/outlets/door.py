@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from onboard.daemon.outlets import limits
-from onboard.errors import ConfigurationError
+from onboard.errors import NOT_OURS, ConfigurationError, UnavailableError
 
 if TYPE_CHECKING:
     from onboard.daemon.outlets.control import ControlServer, Page
@@ -66,14 +66,16 @@ class Door:
         """Bind the port.
 
         Raises:
-            ConfigurationError: it cannot be had.
+            UnavailableError: another program has it, or the address is none of ours (yet).
+            ConfigurationError: it cannot be had at all.
         """
         try:
             self._socket = bound(self._address, self._port)
         except OSError as error:
-            raise ConfigurationError(
-                f"[http] {self._address}:{self._port}: {error.strerror or error}"
-            ) from None
+            where = f"{self._address}:{self._port}"
+            if error.errno in NOT_OURS:
+                raise UnavailableError(f"[http] {where}: {error.strerror}") from None
+            raise ConfigurationError(f"[http] {where}: {error.strerror or error}") from None
         asyncio.get_running_loop().add_reader(self._socket, self._knock)
 
     def publish(self) -> None:

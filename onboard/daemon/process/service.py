@@ -108,7 +108,8 @@ class Service:
         Raises:
             LinkError: no heartbeat in the time limit.
             EndpointError: an endpoint cannot be opened.
-            ConfigurationError: the HTTP port is taken.
+            UnavailableError: an endpoint or the HTTP port is another program's.
+            ConfigurationError: the HTTP port cannot be had at all.
         """
         try:
             with stop_signals(self._signalled) if handle_signals else contextlib.nullcontext():

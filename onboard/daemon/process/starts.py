@@ -7,8 +7,9 @@ every few seconds, for as long as there is power.  systemd's own growing delay (
 some times in a day waits longest for the crash in flight.
 
 The count is a file in the unit's runtime directory, which outlives a restart and neither a stop nor
-a boot.  Only what nobody foresaw counts: failures with a sentence and a status of their own have
-waited for a heartbeat, or are not started again.
+a boot.  What nobody foresaw counts, and what another program has (a port, a directory), which is
+told at once: other failures with a sentence and a status of their own have waited for a heartbeat,
+or are not started again.
 """
 
 from __future__ import annotations
