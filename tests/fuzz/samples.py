@@ -134,7 +134,7 @@ def _sums() -> bytes:
     rng = np.random.default_rng(1)
     rows = rng.normal(size=(50, m))
     square = rows.T @ rows
-    block = Block(0.0, 9.0, NormalSums(square, rows.sum(axis=0), np.diag(square), 60.0, 50.0, 1.0))
+    block = Block(0.0, 9.0, NormalSums(square, rows.sum(axis=0), 0.1 * square, 60.0, 50.0, 1.0))
     point = Linearisation(
         scale=(1.0, 1.0, 1.0), beta=(0.0, 0.0, 0.0), delay=0.1, window=0.0, attitude_delay=0.0
     )

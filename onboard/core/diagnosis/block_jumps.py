@@ -40,7 +40,7 @@ def stepped(fitter: Fitter, boundary: int) -> Fitter:
     for i, p in enumerate(fitter.blocks):
         sums, own = NormalSums.zeros(m + 3), p.sums
         sums.s, sums.rows, sums.log_det = own.s, own.rows, own.log_det
-        sums.G[:m] = own.G
+        sums.G[:m, :m] = own.G
         if i >= boundary:
             sums.N[:] = own.N[np.ix_(after, after)]
             sums.b[:] = own.b[after]
@@ -82,7 +82,7 @@ def jumps_of_blocks(fitter: Fitter, free: Sequence[int]) -> list[tuple[int, floa
         b = np.concatenate([shifted.b[index], after.b[offsets]])
         theta = np.linalg.solve(N + prior, b + prior @ mean)
         off = theta - mean
-        N[: len(index), : len(index)] += np.diag(shifted.G[index])
+        N[: len(index), : len(index)] += shifted.G[np.ix_(index, index)]
         chi2 = shifted.s - 2 * theta @ b + theta @ N @ theta + off @ prior @ off
         out.append((i, float(base.chi2 - chi2)))
     return out

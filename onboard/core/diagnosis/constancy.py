@@ -39,6 +39,7 @@ from onboard.core.diagnosis.effort import MOST_PARTS
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.estimate.limits import CONTRADICTION, FEWEST_BLOCKS
 from onboard.core.estimate.scatter import Scatter
+from onboard.core.estimate.solution import share_of_gram
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, total
 from onboard.core.model.regressors import Model
@@ -137,8 +138,9 @@ class Pieces:
         """A flight, neighbouring blocks together where there are many, about its fit."""
         parts = np.array_split(np.arange(len(blocks)), min(MOST_PARTS, len(blocks)))
         sums = [total([blocks[i] for i in part]) for part in parts]
-        N = np.array([p.signal for p in sums])
         prior = 1.0 / model.prior_sigma**2
+        # Of a part alone noise may be more than there is: what is left must stay a variance.
+        N = np.array([p.N - share_of_gram(p, np.diag(prior)) * p.G for p in sums])
         b = np.array([p.b for p in sums])
         asked = b.sum(axis=0) + prior * model.prior
         theta = np.linalg.solve(N.sum(axis=0) + np.diag(prior), asked)

@@ -16,7 +16,7 @@ from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
 from onboard.core.estimate.approach import worth
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.going_through import through
-from onboard.core.estimate.solution import Solution, solve
+from onboard.core.estimate.solution import Solution, noise_matters, solve
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.refused import Refused
 from onboard.core.filter.traces import EpochTrace, PassResult, Traces
@@ -81,6 +81,7 @@ class Examination(Engine):
             uses=Uses(refused=refused),
             more=(*families, *self.carried, *answers),
         )
+        self.noisy = origin.noisy or _is_noisy(origin)
         self._refused_by: Engine | None = like
         self.batches = list(like.batches if batches is None else batches)
         for answer in answers:
@@ -274,6 +275,15 @@ class Examination(Engine):
     def indices_of(self, families: Sequence[Effect]) -> list[int]:
         """Columns of some families."""
         return [i for f in families for i in self.indices(f)]
+
+
+def _is_noisy(engine: Engine) -> bool:
+    """Whether noise in the regressors of an examination matters to the six."""
+    if not isinstance(engine, Examination) or not engine.blocks:
+        return False
+    effects = {i for f in engine.families for i in engine.indices(f)}
+    index = [i for i in range(engine.model.size) if i not in effects]
+    return noise_matters(engine.blocks, engine.model, index)
 
 
 def _answers(families: Sequence[Family], most: float) -> tuple[EkfJumped, ...]:

@@ -101,7 +101,7 @@ def _with_jumps(
     signs = np.outer(sign[mine], sign[mine])
     sums = NormalSums.zeros(model.size)
     sums.N[to] = signs * far.N[of]
-    sums.G[mine] = far.G[source[mine]]
+    sums.G[to] = signs * far.G[of]
     sums.b[mine] = sign[mine] * far.b[source[mine]]
     sums.s, sums.rows, sums.log_det = far.s, far.rows, far.log_det
     if after:

@@ -99,6 +99,10 @@ FOLDS: Final = 8
 GRAM_DOUBT: Final = 0.5
 """Relative uncertainty of the noise that was taken out of the regressors: its spectrum is a guess
 [cost]."""
+MATTERS: Final = 0.2
+"""Sigma by which noise in the scales' own regressors may move one of the six before that in all
+others is carried, too: it gives about half of it back, and answers are the same to a tenth of a
+sigma [bound]."""
 FEWEST_BLOCKS: Final = 6
 """Fewer blocks do not tell a cluster's scatter [cost]."""
 FEWEST_FREEDOM: Final = 3.0

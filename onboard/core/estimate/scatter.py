@@ -48,7 +48,7 @@ class Scatter:
 
     @classmethod
     def of(
-        cls, blocks: Sequence[Block], theta: Array, inverse: Array, gram_share: Array
+        cls, blocks: Sequence[Block], theta: Array, inverse: Array, gram_share: float
     ) -> Scatter:
         """About a fit of all unknowns.
 
@@ -56,7 +56,7 @@ class Scatter:
             blocks: with sums of m unknowns.
             theta: (m,) what was found.
             inverse: (m, m) its covariance by the sums.
-            gram_share: (m,) share of the noise's Gram that was taken out of the regressors.
+            gram_share: of the noise's Gram that was taken out of the regressors.
         """
         stacked = Stacked(blocks)
         return cls(stacked, stacked.scores(theta, gram_share), inverse)
@@ -149,7 +149,6 @@ class Stacked:
         """Take blocks with sums of n unknowns."""
         self._blocks = list(blocks)
         self._b = np.stack([p.b for p in blocks])
-        self._gram = np.stack([p.G for p in blocks])
         self._all = self._stack(slice(None)) if len(blocks) <= BLOCKS_TOGETHER else None
 
     def information(self) -> Iterator[tuple[slice, Array]]:
@@ -158,12 +157,12 @@ class Stacked:
             part = slice(first, first + BLOCKS_TOGETHER)
             yield part, self._stack(part) if self._all is None else self._all
 
-    def scores(self, theta: Array, gram_share: Array | float = 1.0) -> Array:
+    def scores(self, theta: Array, gram_share: float = 1.0) -> Array:
         """What each block asks for beyond ``theta`` (n,): (blocks, n).
 
         ``gram_share`` is the share of the noise's Gram that is taken out of the regressors.
         """
-        out = self._b + gram_share * self._gram * theta
+        out = self._b + gram_share * np.stack([p.noise_along(theta) for p in self._blocks])
         for part, N in self.information():
             out[part] -= N @ theta
         return out

@@ -19,6 +19,7 @@ from onboard.core.estimate.limits import (
     FEWEST_BLOCKS,
     FOLDS,
     GRAM_DOUBT,
+    MATTERS,
     MOST_NOISE,
     ONE_IN_A_THOUSAND,
 )
@@ -54,17 +55,17 @@ class Solution:
     rows: float
 
 
-def _limited_gram(sums: NormalSums, prior_information: Array) -> Array:
-    """The noise Gram, limited so that what is left stays positive definite."""
-    G = np.diag(sums.G)
+def share_of_gram(sums: NormalSums, prior_information: Array) -> float:
+    """Of the noise Gram, so that what is left stays positive definite."""
+    G = sums.G
     if not np.any(G):
-        return G
+        return 1.0
     A = sums.N + prior_information
     # Largest share of any direction that the noise claims.
     L = np.linalg.cholesky(A)
     scaled = np.linalg.solve(L, np.linalg.solve(L, G).T)
     share = float(np.linalg.eigvalsh((scaled + scaled.T) / 2).max())
-    return G if share <= MOST_NOISE else G * (MOST_NOISE / share)
+    return 1.0 if share <= MOST_NOISE else MOST_NOISE / share
 
 
 def solve(blocks: Sequence[Block], model: Model) -> Solution:
@@ -72,7 +73,8 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     sums = total(blocks)
     prior_information = 1.0 / model.prior_sigma**2
     prior = np.diag(prior_information)
-    G = _limited_gram(sums, prior)
+    share = share_of_gram(sums, prior)
+    G = share * sums.G
     D = sums.N - G
     inverse = np.asarray(np.linalg.inv(D + prior), dtype=np.float64)
     theta = inverse @ (sums.b + prior_information * model.prior)
@@ -81,7 +83,6 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     V = np.eye(model.size) * max(1.0, nis)
     bare: Callable[[], Array] = V.copy
     if len(blocks) >= FEWEST_BLOCKS:
-        share = np.divide(np.diag(G), sums.G, out=np.zeros(sums.size), where=sums.G > 0)
         scatter = Scatter.of(blocks, theta, inverse, share)
         pool = scatter.pool(prior_information, max(1.0, nis))
         V = scatter.noise(X, strength, pool)
@@ -114,6 +115,39 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
         nis,
         sums.rows,
     )
+
+
+def limited(blocks: list[Block], model: Model) -> list[Block]:
+    """Blocks whose noise in the regressors leaves something in every direction of the flight."""
+    if not blocks:
+        return blocks
+    share = share_of_gram(total(blocks), np.diag(model.prior_sigma**-2.0))
+    if share >= 1.0:
+        return blocks
+    out = []
+    for block in blocks:
+        sums = block.sums
+        sums.G *= share
+        out.append(Block(block.start, block.end, sums))
+    return out
+
+
+def noise_matters(blocks: Sequence[Block], model: Model, index: list[int]) -> bool:
+    """Whether noise in the regressors moves one of the six by more than answers may differ.
+
+    Args:
+        blocks: of the flight.
+        model: of the sums.
+        index: unknowns that are fitted, with the six first.
+    """
+    sums = total(blocks).subset(index)
+    if not np.any(sums.G):
+        return False
+    information = model.prior_sigma[index] ** -2.0
+    covariance = np.linalg.inv(sums.N + np.diag(information))
+    theta = covariance @ (sums.b + model.prior[index] * information)
+    moved = np.abs(covariance @ (sums.G @ theta))[:6]
+    return bool(np.any(moved > MATTERS * np.sqrt(np.diag(covariance)[:6])))
 
 
 def _largest_ratio(a: Array, b: Array) -> float:

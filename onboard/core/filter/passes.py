@@ -335,7 +335,7 @@ class Pass:
         # The Gram is by body axes; the sensor's are permuted or mixed by R_bs.
         sensor = (segment.R_bs**2).T @ gram
         for j in range(3):
-            sums.G[at + j] = share[j] * sensor[j]
+            sums.G[at + j, at + j] = share[j] * sensor[j]
 
 
 def _first_believed(fixes: Fixes, trusted: NDArray[np.bool_]) -> int:

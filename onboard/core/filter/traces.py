@@ -199,6 +199,12 @@ class Traces:
         out.refused, out.refused_by = dict(self.refused), dict(self.refused_by)
         return out
 
+    def of_first(self, m: int) -> Traces:
+        """The same with the first ``m`` regressors."""
+        self._columns = self._columns[:, :, :m].copy()
+        self._rows = [(rows[:, : m + 1], height) for rows, height in self._rows]
+        return self
+
     def _next(self, count: int) -> slice:
         """Places of the next epochs; where room is short there is made twice as much."""
         first, self._count = self._count, self._count + count

@@ -28,7 +28,7 @@ class Block:
         end: likewise.
     """
 
-    __slots__ = ("_m", "_numbers", "end", "start")
+    __slots__ = ("_m", "_noise", "_noisy", "_numbers", "end", "start")
 
     def __init__(self, start: float, end: float, sums: NormalSums) -> None:
         """Take the sums as they are now."""
@@ -36,12 +36,15 @@ class Block:
         self._m = m = sums.size
         head = np.array([sums.s, sums.rows, sums.log_det])
         half = sums.N.ravel()[_places(m)[0]]
-        self._numbers: Array = np.concatenate([head, sums.b, sums.G, half])
+        self._numbers: Array = np.concatenate([head, sums.b, half])
+        # Few regressors have noise, and of hours there are many blocks.
+        self._noisy = np.flatnonzero(np.diagonal(sums.G))
+        self._noise: Array = sums.G[np.ix_(self._noisy, self._noisy)]
 
     @property
     def sums(self) -> NormalSums:
         """A copy of the sums."""
-        return _sums(self._numbers, self._m)
+        return total([self])
 
     @property
     def rows(self) -> float:
@@ -53,20 +56,28 @@ class Block:
         """(m,) ``sum h^T y``."""
         return self._numbers[_HEAD : _HEAD + self._m]
 
-    @property
-    def G(self) -> Array:
-        """(m,) noise in the regressors."""
-        return self._numbers[_HEAD + self._m : _HEAD + 2 * self._m]
+    def noise_along(self, theta: Array) -> Array:
+        """(m,) noise in the regressors times ``theta`` (m,)."""
+        out = np.zeros(self._m)
+        out[self._noisy] = self._noise @ theta[self._noisy]
+        return out
+
+    def add_noise(self, G: Array) -> None:
+        """Add the noise in the regressors to (m, m)."""
+        G[np.ix_(self._noisy, self._noisy)] += self._noise
 
     @property
     def half(self) -> Array:
         """The triangle of the information, as :func:`whole` takes it."""
-        return self._numbers[_HEAD + 2 * self._m :]
+        return self._numbers[_HEAD + self._m :]
 
 
 def total(blocks: Sequence[Block]) -> NormalSums:
     """Sum over blocks (at least one) of the same unknowns."""
-    return _sums(reduce(np.add, (p._numbers for p in blocks)), blocks[0]._m)  # noqa: SLF001
+    sums = _sums(reduce(np.add, (p._numbers for p in blocks)), blocks[0]._m)  # noqa: SLF001
+    for p in blocks:
+        p.add_noise(sums.G)
+    return sums
 
 
 def whole(halves: Sequence[Array], m: int) -> Array:
@@ -76,9 +87,8 @@ def whole(halves: Sequence[Array], m: int) -> Array:
 
 def _sums(numbers: Array, m: int) -> NormalSums:
     s, rows, log_det = numbers[:_HEAD].tolist()
-    b, G = numbers[_HEAD:][:m].copy(), numbers[_HEAD + m :][:m].copy()
-    N = np.take(numbers[_HEAD + 2 * m :], _places(m)[1]).reshape(m, m)
-    return NormalSums(N, b, G, s, rows, log_det)
+    N = np.take(numbers[_HEAD + m :], _places(m)[1]).reshape(m, m)
+    return NormalSums(N, numbers[_HEAD:][:m].copy(), np.zeros((m, m)), s, rows, log_det)
 
 
 @lru_cache(maxsize=32)

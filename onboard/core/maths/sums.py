@@ -34,8 +34,7 @@ class NormalSums:
     Attributes:
         N: (m, m) ``sum h^T h``, the information matrix: 1 / (unit of i times unit of j).
         b: (m,) ``sum h^T y``, 1 / unit of i.
-        G: (m,) expected part of the diagonal of ``N`` that is noise in the regressors (errors in
-            variables): that of one regressor has nothing to do with that of another.
+        G: (m, m) expected part of ``N`` that is noise in the regressors (errors in variables).
         s: ``sum y^2``, dimensionless.
         rows: number of whitened innovations (scalars).
         log_det: sum of the log determinants of their covariances (for likelihoods).
@@ -51,7 +50,7 @@ class NormalSums:
     @classmethod
     def zeros(cls, m: int) -> NormalSums:
         """Empty sums of ``m`` unknowns."""
-        return cls(np.zeros((m, m)), np.zeros(m), np.zeros(m))
+        return cls(np.zeros((m, m)), np.zeros(m), np.zeros((m, m)))
 
     @property
     def size(self) -> int:
@@ -95,7 +94,7 @@ class NormalSums:
         """Sums of a smaller model: the other unknowns held at zero."""
         block, some = np.ix_(index, index), list(index)
         return NormalSums(
-            self.N[block], self.b[some], self.G[some], self.s, self.rows, self.log_det
+            self.N[block], self.b[some], self.G[block], self.s, self.rows, self.log_det
         )
 
     def shifted(self, theta: Array) -> NormalSums:
@@ -112,7 +111,7 @@ class NormalSums:
     @property
     def signal(self) -> Array:
         """(m, m) ``N`` less what of it is noise in the regressors."""
-        return self.N - np.diag(self.G)
+        return self.N - self.G
 
     def residual(self, theta: Array) -> float:
         """``sum (y - h theta)^2``, the normalised innovation squared at ``theta`` (m,)."""
@@ -121,7 +120,7 @@ class NormalSums:
     def to_bytes(self) -> bytes:
         """Little-endian doubles behind a head of 12 bytes."""
         tail = np.array([self.s, self.rows, self.log_det])
-        body = np.concatenate([self.N.ravel(), self.b, np.diag(self.G).ravel(), tail]).astype("<f8")
+        body = np.concatenate([self.N.ravel(), self.b, self.G.ravel(), tail]).astype("<f8")
         return _HEAD.pack(_MAGIC, self.size, len(body)) + body.tobytes()
 
     @classmethod
@@ -143,7 +142,7 @@ class NormalSums:
         return cls(
             body[:square].reshape(m, m).copy(),
             body[square : square + m].copy(),
-            np.diag(body[square + m : 2 * square + m].reshape(m, m)).copy(),
+            body[square + m : 2 * square + m].reshape(m, m).copy(),
             *(float(x) for x in body[-3:]),
         )
 
@@ -241,7 +240,7 @@ class BankSums:
         return NormalSums(
             self.N[i].copy(),
             self.b[i].copy(),
-            np.zeros_like(self.b[i]),
+            np.zeros_like(self.N[i]),
             float(self.s[i]),
             float(self.rows),
             float(self.log_det[i]),

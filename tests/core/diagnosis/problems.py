@@ -45,7 +45,9 @@ class Problem:
         """The same as sums."""
         out = []
         for i, (h, y) in enumerate(zip(self.h, self.y, strict=True)):
-            sums = NormalSums(h.T @ h, h.T @ y, np.zeros(self.model.size), y @ y, len(y))
+            sums = NormalSums(
+                h.T @ h, h.T @ y, np.zeros((self.model.size, self.model.size)), y @ y, len(y)
+            )
             out.append(Block(BLOCK_S * i, BLOCK_S * (i + 1), sums))
         return out
 

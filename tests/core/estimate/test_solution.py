@@ -101,7 +101,9 @@ def test_noise_in_the_regressors_is_taken_out():
     naive = np.linalg.lstsq(read, y, rcond=None)[0]
     assert naive[0] == pytest.approx(TRUTH[0] * 4.0 / (4.0 + noise**2), rel=0.02)
     one = block(0, read, y)
-    one.G[0] = n * noise**2
+    sums = one.sums
+    sums.G[0, 0] = n * noise**2
+    one = Block(one.start, one.end, sums)
     wide = Model([Six(scale_sigma=10.0, beta_sigma=10.0)])
     assert solve([one], wide).theta[0] == pytest.approx(TRUTH[0], abs=0.02)
 

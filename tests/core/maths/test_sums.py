@@ -22,7 +22,7 @@ def summed(h, y):
     sums = BankSums(1, M)
     sums.add(y[None], h[None], np.array([0.1 * len(y)]))
     out = sums.member(0)
-    out.G = 0.01 * np.sum(h**2, axis=0)
+    out.G = 0.01 * h.T @ h
     return out
 
 
@@ -79,7 +79,7 @@ def test_subset_is_the_smaller_model():
     small = summed(h, y).subset(index)
     np.testing.assert_allclose(small.N, h[:, index].T @ h[:, index])
     np.testing.assert_allclose(small.b, h[:, index].T @ y)
-    np.testing.assert_allclose(small.G, 0.01 * np.diag(small.N))
+    np.testing.assert_allclose(small.G, 0.01 * small.N)
     np.testing.assert_allclose(np.diag(small.signal), 0.99 * np.diag(small.N))
     assert (small.s, small.rows) == (pytest.approx(float(y @ y)), 30)
 
@@ -161,7 +161,7 @@ def test_members_of_a_bank_are_summed_each_for_itself():
         (bank if epoch % 2 else other).add(y, h, log_det)
         for i in range(3):
             N, b = h[i].T @ h[i], h[i].T @ y[i]
-            one = NormalSums(N, b, np.zeros(M), float(y[i] @ y[i]), 4, float(log_det[i]))
+            one = NormalSums(N, b, np.zeros((M, M)), float(y[i] @ y[i]), 4, float(log_det[i]))
             alone[i] = alone[i] + one
     bank += other
     for i in range(3):
