@@ -52,6 +52,8 @@ of a radian [data sheet]."""
 MOTION_S: Final = 0.95
 """s over which velocity is compared with force and position: five fixes at 5 Hz, one at 1 Hz, and
 long beside a receiver's lag [data sheet]."""
+LAGS_S: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
+"""s by which a receiver's velocity may lag [data sheet]."""
 LONGEST_SPAN_S: Final = 2.5
 """s, past which it is an outage between two samples [data sheet]."""
 LONGEST_GAP_S: Final = 0.3
@@ -71,8 +73,8 @@ APART_SHARE: Final = 0.15
 apart, or a unit that is 1.75 times the other.  Scales, axes and delays of the catalogue make a
 hundredth [physics]."""
 APART_SHARE_FORCE: Final = 0.5
-"""The same of accelerations: a receiver's lag of half a second takes a quarter of a manoeuvre of
-three seconds out of its place [physics]."""
+"""The same of accelerations: a receiver that averages half a second takes a quarter of a manoeuvre
+of three seconds away [physics]."""
 FEWEST_APART: Final = 10
 """Spans that must be wrong at least, beside a tenth of all and half of those that move: a glitch
 of a few seconds is none [probability]."""

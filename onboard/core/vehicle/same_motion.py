@@ -11,7 +11,7 @@ consistent with itself; then rotors or wings would have to pull it down.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +32,7 @@ from onboard.core.vehicle.limits import (
     APART_SHARE_FORCE,
     APART_VELOCITY_M_S,
     FEWEST_APART,
+    LAGS_S,
     LONGEST_GAP_S,
     LONGEST_SPAN_S,
     MOST_OUTLYING,
@@ -109,10 +110,14 @@ def disagreement(recorded: Recorded, *, derived: bool = False) -> Disagreement |
         recorded: in flight or not: at rest all agree.
         derived: whether the force is the slope of the velocity.
     """
-    pairs = (_ways(recorded), _turns(recorded), None if derived else _pushes(recorded))
-    for pair in pairs:
+    for pair in (_ways(recorded), _turns(recorded)):
         if pair is not None and (found := _apart(pair)) is not None:
             return found
+    # A receiver lags, and in gusts that is all there is to see: one lag must make them agree.
+    pushes = [] if derived else [_apart(pair) for pair in _pushes(recorded)]
+    apart = [found for found in pushes if found is not None]
+    if apart and len(apart) == len(pushes):
+        return min(apart, key=lambda found: found.size)
     return _overturned(recorded)
 
 
@@ -221,24 +226,29 @@ def _turns(recorded: Recorded) -> Pair | None:
     return Pair(by_attitude, by_gyro, ("attitude", "rates"), BODY, *its)
 
 
-def _pushes(recorded: Recorded) -> Pair | None:
-    """Mean accelerations over spans by the force, turned by the attitude, and by the velocity."""
+def _pushes(recorded: Recorded) -> Iterator[Pair]:
+    """Mean accelerations over spans by the force, turned by the attitude, and by the velocity.
+
+    One for each lag that a receiver may have; none if there is nothing to compare.
+    """
     attitude, force = _ordered(recorded.attitude), _ordered(recorded.force)
     velocity = _ordered(recorded.velocity, level=True)
     if len(attitude) < 2:
-        return None
+        return
     inside = (force[:, 0] >= attitude[0, 0]) & (force[:, 0] <= attitude[-1, 0])
     t, f = force[inside, 0], force[inside, 1:]
     spans = _spans(velocity[:, 0], MOTION_S, t)
     if spans is None:
-        return None
+        return
     early, late = spans
     start, end = velocity[early, 0], velocity[late, 0]
     R = interpolate_rotation(t, attitude[:, 0], rotation_from_euler(*attitude[:, 1:].T))
     felt = np.einsum("nij,nj->ni", R, f) + np.array([0.0, 0.0, STANDARD_GRAVITY])
     changed = (velocity[late, 1:] - velocity[early, 1:]) / (end - start)[:, None]
     its = "m/s^2", APART_FORCE_M_S2, APART_SHARE_FORCE
-    return Pair(_over(start, end, t, felt), changed, ("force", "velocity"), WORLD, *its)
+    for lag in LAGS_S:
+        pushed = _over(start - lag, end - lag, t, felt)
+        yield Pair(pushed, changed, ("force", "velocity"), WORLD, *its)
 
 
 def _ways(recorded: Recorded) -> Pair | None:

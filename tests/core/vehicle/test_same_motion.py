@@ -15,12 +15,17 @@ from tests.core.vehicle.flights import G, smooth
 LATITUDE = 0.8
 
 
-def flown(seed=1, seconds=120.0, speed=4.0, lean=0.2, rate=10.0):
-    """A motion whose quantities follow from each other, at 10 Hz, with noise of sensors."""
+def flown(seed=1, seconds=120.0, speed=4.0, lean=0.2, rate=10.0, gusts=0.0):
+    """A motion whose quantities follow from each other, at 10 Hz, with noise of sensors.
+
+    Gusts are up and down, and others after a sixth of a second.
+    """
     rng = np.random.default_rng(seed)
     n = int(seconds * rate)
     t = np.arange(n) / rate
     v = np.stack([smooth(rng, n, speed), smooth(rng, n, speed), smooth(rng, n, 0.4 * speed)], 1)
+    if gusts > 0.0:
+        v[:, 2] += smooth(rng, n, gusts, 0.1)
     angles = [smooth(rng, n, lean), smooth(rng, n, lean), smooth(rng, n, 3.0 * lean, 4.0)]
     R = rotation_from_euler(*angles)
     a = np.gradient(v, t, axis=0)
@@ -126,6 +131,15 @@ def test_a_body_that_is_turned_over_agrees_with_itself_and_carries_nothing():
     found = disagreement(turned_over(flown(7)))
     assert found is not None
     assert "body" in found.hint
+
+
+def test_a_receiver_that_lags_in_gusts_contradicts_nothing():
+    """Down, its velocity of 0.4 s ago has next to nothing to do with that of now."""
+    its, lag = flown(4, gusts=4.0), np.array([0.4, 0.0, 0.0, 0.0])
+    late = replace(its, velocity=its.velocity + lag, position=its.position + lag)
+    assert disagreement(late) is None
+    for wrong in (lambda f: -f, lambda f: 2.0 * f, lambda f: f * [1.0, 1.0, -1.0]):
+        assert disagreement(changed(late, "force", wrong)).names == ("force", "velocity")
 
 
 def test_a_glitch_of_seconds_is_no_contradiction():
