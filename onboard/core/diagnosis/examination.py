@@ -16,8 +16,12 @@ from onboard.core.diagnosis.effort import NEIGHBOURS, SAMPLE_S, WORTH_A_PASS
 from onboard.core.estimate.approach import worth
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.going_through import through
-from onboard.core.estimate.solution import Solution, noise_matters, solve
+from onboard.core.estimate.solution import Solution, limited, noise_matters, solve
 from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.noise import NoiseLevels
+from onboard.core.filter.noisy_pass import NoisyPass
+from onboard.core.filter.passes import Pass
+from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.refused import Refused
 from onboard.core.filter.traces import EpochTrace, PassResult, Traces
 from onboard.core.filter.whitening import Uses
@@ -66,6 +70,8 @@ class Examination(Engine):
         self.carried: tuple[Family, ...] = (*inherited, *carried)
         self.families = tuple(families)
         origin = start or like
+        self.noisy: bool = isinstance(origin, Examination) and (origin.noisy or origin.found_noisy)
+        """Whether noise in the samples is carried through all that is made of them."""
         point = replace(point or origin.point, skew_from=t0)
         if not any(getattr(f, "effect", "") == "clock_skew" for f in families):
             point = replace(point, skew=0.0)
@@ -81,7 +87,6 @@ class Examination(Engine):
             uses=Uses(refused=refused),
             more=(*families, *self.carried, *answers),
         )
-        self.noisy = origin.noisy or _is_noisy(origin)
         self._refused_by: Engine | None = like
         self.batches = list(like.batches if batches is None else batches)
         for answer in answers:
@@ -141,6 +146,32 @@ class Examination(Engine):
             C[np.ix_(rivals, rivals)], theta[rivals]
         )
         return absent
+
+    def _new_pass(
+        self,
+        members: tuple[NoiseLevels, ...] | None = None,
+        ready: Preparations | None = None,
+    ) -> Pass:
+        """As there; noise is carried through all that is made of samples where it matters."""
+        if not self.noisy or members is not None:
+            return super()._new_pass(members, ready)
+        made = NoisyPass(self.model, self.point, self.noise, self.uses)
+        if self._seed is not None:
+            made.hold(self.about_point(self._seed.theta), self._seed.covariance)
+        return made
+
+    def once(self, held: tuple[Array, Array] | None = None) -> None:
+        """As there."""
+        super().once(held)
+        if self.noisy:
+            self.blocks = limited(self.blocks, self.model)
+
+    @property
+    def found_noisy(self) -> bool:
+        """Whether noise in the regressors matters to the six, by the last pass."""
+        effects = {i for f in self.families for i in self.indices(f)}
+        index = [i for i in range(self.model.size) if i not in effects]
+        return len(self.blocks) > 0 and noise_matters(self.blocks, self.model, index)
 
     def begin(self) -> None:
         """A pass begins: its epochs are kept, those of the one before are not."""
@@ -275,15 +306,6 @@ class Examination(Engine):
     def indices_of(self, families: Sequence[Effect]) -> list[int]:
         """Columns of some families."""
         return [i for f in families for i in self.indices(f)]
-
-
-def _is_noisy(engine: Engine) -> bool:
-    """Whether noise in the regressors of an examination matters to the six."""
-    if not isinstance(engine, Examination) or not engine.blocks:
-        return False
-    effects = {i for f in engine.families for i in engine.indices(f)}
-    index = [i for i in range(engine.model.size) if i not in effects]
-    return noise_matters(engine.blocks, engine.model, index)
 
 
 def _answers(families: Sequence[Family], most: float) -> tuple[EkfJumped, ...]:

@@ -32,10 +32,9 @@ from onboard.core.estimate.limits import (
 )
 from onboard.core.estimate.noise_search import NoiseSearch, levels_told
 from onboard.core.estimate.settings import CalibratorSettings
-from onboard.core.estimate.solution import Solution, limited, solve
+from onboard.core.estimate.solution import Solution, solve
 from onboard.core.estimate.told_antenna import batch_from, point_from, shift_by, shifted
 from onboard.core.filter.noise import NoiseLevels, log_prior
-from onboard.core.filter.noisy_pass import NoisyPass
 from onboard.core.filter.passes import Pass
 from onboard.core.filter.preparations import Preparations
 from onboard.core.filter.traces import PassResult, StateLog
@@ -95,8 +94,6 @@ class Engine(Watched):
         self.trusted_s = 0.0
         self.left_brisk_s = 0.0
         """Of :attr:`brisk_s` what has left the buffer."""
-        self.noisy = False
-        """Whether noise in the samples is carried through all regressors that are made of them."""
         self._waiting = 0
         """Batches that were added and that no pass has gone through yet, at the end."""
         self._buffered_s = self._refined_s = 0.0
@@ -140,11 +137,6 @@ class Engine(Watched):
         theta = None if solution is None else solution.theta
         if theta is not None and not ready:
             theta = self.about_point(theta)
-        if self.noisy and members is None and ready is None:
-            held = None if solution is None else solution.covariance
-            return NoisyPass(
-                self.model, self.point, self.noise, uses=self.uses, theta=theta, covariance=held
-            )
         return Pass(
             self.model,
             self.point,
@@ -269,8 +261,6 @@ class Engine(Watched):
         self.blocks = []
         self._waiting = len(self.batches)
         self._catch_up()
-        if self.noisy:
-            self.blocks = limited(self.blocks, self.model)
 
     def tune(self, *, levels: bool = True) -> None:
         """Estimate timing and noise; the sums are still those of before, until :meth:`once`.

@@ -38,7 +38,7 @@ from onboard.core.model.regressors import Family, Model, SegmentRegressors, Unkn
 MADE_OF_SAMPLES = ("six", "gps_latency", "gps_smoothing")
 """Families of every model whose regressors are made of the samples of the force."""
 NOTHING = 1e-9
-"""Sigma of what takes no part, in whatever unit [cost]."""
+"""Sigma of what takes no part, in whatever unit: no flight knows anything as well [cost]."""
 
 
 class NoisyPass(Pass):
@@ -49,18 +49,13 @@ class NoisyPass(Pass):
         model: Model,
         point: Linearisation,
         levels: NoiseLevels,
-        *,
         uses: Uses | None = None,
-        theta: Array | None = None,
-        covariance: Array | None = None,
     ) -> None:
         """Take what a :class:`~onboard.core.filter.passes.Pass` of one member takes."""
         self._own = model.size
         wide = _WithNoise(model, point, levels)
         self._noisy = wide.noisy
         super().__init__(wide, point, (levels,), uses=uses)
-        if theta is not None and covariance is not None:
-            self.hold(theta, covariance)
 
     def hold(self, theta: Array, covariance: Array) -> None:
         """As there, of the model's own m unknowns."""
