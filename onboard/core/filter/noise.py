@@ -93,7 +93,7 @@ class NoiseLevels:
         return np.array([self.shaken_walk, self.shaken_walk, self.shaken_lift]) ** 2
 
     def walk_shaken(self, density_b: Array) -> Array:
-        """(3,) variance of the walk where ``density_b`` (3,) is how much it is shaken."""
+        """(..., 3) variance of the walk where ``density_b`` (..., 3) is how much it is shaken."""
         out: Array = self.walk_b + self.shaken_b * density_b
         return out
 

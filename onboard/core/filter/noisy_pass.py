@@ -22,14 +22,13 @@ from numpy.typing import NDArray
 from onboard.core.filter.limits import SHAKEN_LASTS_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.passes import Pass
-from onboard.core.filter.regressor_noise import noise_density
+from onboard.core.filter.regressor_noise import share_of_walk
 from onboard.core.filter.shaken import shaken_between, walk_s
 from onboard.core.filter.traces import PassResult
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block
-from onboard.core.maths.sums import NormalSums
 from onboard.core.model.around import Around, around
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.quadrature import Intervals, NodeMaker
@@ -43,6 +42,8 @@ NOTHING = 1e-9
 
 class NoisyPass(Pass):
     """A pass of one member whose sums know what of them is noise in the regressors."""
+
+    carries_walk = False
 
     def __init__(
         self,
@@ -72,11 +73,8 @@ class NoisyPass(Pass):
         own.G[:] = 0.0
         own.G[np.ix_(self._noisy, self._noisy)] = sums.N[m:, m:]
         result.block = Block(block.start, block.end, own)
-        result.traces = result.traces.of_first(m)
+        result.traces.keep_first(m)
         return result
-
-    def _noise_in_regressors(self, sums: NormalSums, segment: Segment, gram: Array) -> None:
-        """It comes with the sums."""
 
 
 class _Noise(Family):
@@ -137,8 +135,8 @@ def noise_like(segment: Segment, levels: NoiseLevels) -> Array:
     density_b = (
         shaken_between(segment, t - SHAKEN_LASTS_S / 2.0, t + SHAKEN_LASTS_S / 2.0) / SHAKEN_LASTS_S
     )
-    walk = (levels.walk_b + levels.shaken_b * density_b) @ segment.R_bs**2
-    share = np.minimum(segment.once(noise_density) / walk_s(levels, segment), 1.0)
+    walk = levels.walk_shaken(density_b) @ segment.R_bs**2
+    share = share_of_walk(segment, walk_s(levels, segment))
     spacing = np.gradient(t)[:, None]
     rng = np.random.default_rng([round(1e3 * abs(t[0])), len(t)])
     out: Array = rng.normal(size=(len(t), 3)) * np.sqrt(walk * share / spacing)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
-from onboard.core.filter.regressor_noise import noise_density
+from onboard.core.filter.regressor_noise import share_of_walk
 from onboard.core.filter.shaken import walk_s
 from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
 from onboard.core.filter.uncertainty import Covariance, Information, Uncertainty
@@ -28,6 +29,9 @@ from onboard.core.model.regressors import Model
 
 class Pass:
     """Runs a filter bank through consecutive segments; keeps its state between them."""
+
+    carries_walk: ClassVar[bool] = True
+    """Whether noise in the scale's regressors is worked out, where there is one member."""
 
     def __init__(
         self,
@@ -58,7 +62,7 @@ class Pass:
         self.model = model
         self.point = point
         self.uses = uses or Uses()
-        self.filter = WhiteningFilter(model.size, bank, self.uses)
+        self.filter = WhiteningFilter(model.size, bank, self.uses, walk=self.carries_walk)
         self.keep_traces = traces
         self.keep_rows = False
         """Whether traces have all that was whitened."""
@@ -327,10 +331,7 @@ class Pass:
         """Expected part of ``N`` that is accelerometer noise in the scale's regressors."""
         if "six" not in self.model.slices:
             return
-        # What looks like noise sample by sample may be a tone that integrates to nothing; the
-        # velocity's random walk, found from the residuals, is all that it can amount to.
-        walk = walk_s(self.filter.bank[0], segment)
-        share = np.minimum(segment.once(noise_density) / walk, 1.0)
+        share = share_of_walk(segment, walk_s(self.filter.bank[0], segment))
         at = self.model.slices["six"].start
         # The Gram is by body axes; the sensor's are permuted or mixed by R_bs.
         sensor = (segment.R_bs**2).T @ gram

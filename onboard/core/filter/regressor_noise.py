@@ -23,6 +23,16 @@ def noise_density(segment: Segment) -> Array:
     return sample_noise_density(segment.t, segment.raw_s)
 
 
+def share_of_walk(segment: Segment, walk: Array) -> Array:
+    """(3,) of what the velocity walks by in a second (3,), sensor axes, that samples show as noise.
+
+    What looks like noise sample by sample may be a tone that integrates to nothing; the velocity's
+    random walk, found from the residuals, is all that it can amount to.
+    """
+    out: Array = np.minimum(segment.once(noise_density) / walk, 1.0)
+    return out
+
+
 def sample_noise_density(t: Array, raw: Array) -> Array:
     """Density (m/s^2)^2 s of what looks like white noise in each axis' samples.
 

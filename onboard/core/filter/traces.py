@@ -199,11 +199,10 @@ class Traces:
         out.refused, out.refused_by = dict(self.refused), dict(self.refused_by)
         return out
 
-    def of_first(self, m: int) -> Traces:
-        """The same with the first ``m`` regressors."""
+    def keep_first(self, m: int) -> None:
+        """Keep the first ``m`` regressors alone."""
         self._columns = self._columns[:, :, :m].copy()
         self._rows = [(rows[:, : m + 1], height) for rows, height in self._rows]
-        return self
 
     def _next(self, count: int) -> slice:
         """Places of the next epochs; where room is short there is made twice as much."""

@@ -97,18 +97,23 @@ class WhiteningFilter:
         noise_gram: (3,) sum since :meth:`begin_block` of the squares of what the walk along each
             body axis makes of the whitened innovations
             (:mod:`onboard.core.filter.regressor_noise`); None while several levels are tried, for
-            only the sums that count need it.
+            only the sums that count need it, and where it is not asked for.
     """
 
     def __init__(
-        self, unknowns: int, bank: Sequence[NoiseLevels], uses: Uses | None = None
+        self,
+        unknowns: int,
+        bank: Sequence[NoiseLevels],
+        uses: Uses | None = None,
+        *,
+        walk: bool = True,
     ) -> None:
-        """Take the number of unknowns and the noise levels of each member."""
+        """Take the number of unknowns, the levels of each member, and whether a walk is carried."""
         self.m = unknowns
         self.bank = tuple(bank)
         self.uses = uses or Uses()
         B = len(self.bank)
-        self.noise_gram = np.zeros(3) if B == 1 else None
+        self.noise_gram = np.zeros(3) if B == 1 and walk else None
         self._m1 = unknowns + 1
         matrices = 1 if self.noise_gram is None else 4
         self.carried = np.zeros((B, STATES, self._m1 + matrices * STATES))
