@@ -27,7 +27,7 @@ import numpy as np
 
 from onboard.answers.cures import cured
 from onboard.core.diagnosis.procedure import diagnose
-from onboard.core.diagnosis.records import Diagnosis, Verdict
+from onboard.core.diagnosis.records import REPEATED, Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.determined import determine
 from onboard.core.estimate.merged_flights import Apart
@@ -39,6 +39,9 @@ from onboard.push.diagnosed import Diagnosed
 FORCES = tuple(f"{axis} force at the mean load" for axis in "xyz")
 MOVED_SIGMAS = 2.0
 """Of what is claimed for a number: how far missing physics may move it (5 % move it by chance)."""
+
+DIED = "the accelerometer repeated one reading; see to it before the next flight"
+"""Said of one that has an estimate all the same, of before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +122,7 @@ def judged(diagnosis: Diagnosis, parameters: Mapping[str, float] | None = None) 
     suspects = [e for e in diagnosis.effects if bearing_of(e.name) is not Bearing.HARMLESS]
     if not diagnosis.mismatch.supported:
         return Answer(_refused(diagnosis))
-    diagnosis = _with_what_was_seen(diagnosis)
+    diagnosis = _with_what_died(_with_what_was_seen(diagnosis))
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = ", ".join(dict.fromkeys(phrase_of(e) for e in suspects))
         missing = "the residual is not noise, and " + (
@@ -214,6 +217,15 @@ def _with_what_was_seen(diagnosis: Diagnosis) -> Diagnosis:
     if not seen:
         return diagnosis
     return _noted(diagnosis, f"{'; '.join(seen)}; see onboard explain")
+
+
+def _with_what_died(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis that notes that the accelerometer died in flight: what it was, is right."""
+    dead = [u for u in diagnosis.unused if u.reason == REPEATED]
+    if not dead:
+        return diagnosis
+    seconds = sum(u.end_s - u.start_s for u in dead)
+    return _noted(diagnosis, f"from {dead[0].start_s:.0f} s on, for {seconds:.0f} s, {DIED}")
 
 
 def _uncalibrated(diagnosis: Diagnosis) -> Diagnosis:

@@ -212,7 +212,8 @@ class Recorded:
     def _with_rest(self, found: Diagnosis) -> Diagnosis:
         """With what the accelerometer reads at rest, which is no part of its estimate."""
         c = found.calibration
-        at_rest = self._standing.of(c, self.calibrator.parameters)
+        dead_from = min((start for start, _ in self.calibrator.stuck(c.imu)), default=math.inf)
+        at_rest = self._standing.of(c, self.calibrator.parameters, dead_from)
         return replace(found, calibration=replace(c, at_rest=at_rest))
 
 

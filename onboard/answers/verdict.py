@@ -15,7 +15,7 @@ from onboard.answers.words import (
     signed,
 )
 from onboard.core.diagnosis.excess import HEADING
-from onboard.core.diagnosis.records import Diagnosis, Unused, Verdict
+from onboard.core.diagnosis.records import REPEATED, Diagnosis, Unused, Verdict
 from onboard.core.estimate.result import Calibration
 from onboard.core.physics.catalogue import (
     danger_of,
@@ -35,6 +35,7 @@ LACKING = "something is missing from the model"
 COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 """For terminals, by severity."""
 NOT_ONE = "These recordings are not one flight"
+DEAD = "The accelerometer repeated one reading in flight"
 MOST_NAMED = 2
 NOISE = 1.3
 """Held-out residual, in units of the noise, up to which it may be called noise."""
@@ -51,7 +52,12 @@ SAID_ABOVE = (
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """The verdict as one short sentence."""
+    """The verdict as one short sentence, after another one if the accelerometer died."""
+    said = _headline(diagnosis)
+    return f"{DEAD}. {said}" if _died(diagnosis) else said
+
+
+def _headline(diagnosis: Diagnosis) -> str:
     if diagnosis.split:
         return NOT_ONE
     if diagnosis.verdict is Verdict.INSUFFICIENT:
@@ -85,7 +91,7 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
     if diagnosis.split:
         return f"{NOT_ONE}.", "warning"
     names = [e.name for e in diagnosis.effects]
-    dangerous = any(danger_of(e) for e in diagnosis.effects)
+    dangerous = _died(diagnosis) or any(danger_of(e) for e in diagnosis.effects)
     return diagnosed.headline(diagnosis.verdict.value, names, dangerous=dangerous)
 
 
@@ -97,7 +103,14 @@ def severity(diagnosis: Diagnosis) -> str:
 def dangers(diagnosis: Diagnosis) -> list[str]:
     """Why one should not fly before something is cured: one sentence for each effect."""
     said = [(title_of(e.name), danger_of(e)) for e in diagnosis.effects]
+    if _died(diagnosis):
+        said.insert(0, (DEAD, "it measures nothing meanwhile, or for good"))
     return [f"{title}: {why}. Do not fly before it is cured." for title, why in said if why]
+
+
+def _died(diagnosis: Diagnosis) -> bool:
+    """Whether the accelerometer repeated one reading in flight."""
+    return any(u.reason == REPEATED for u in diagnosis.unused)
 
 
 def missing(diagnosis: Diagnosis) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from onboard.answers.answer import judged
 from onboard.answers.verdict import (
     cures,
     dangers,
@@ -139,6 +140,19 @@ def test_what_is_dangerous_is_named_first_and_told_with_what_to_do():
     assert said.endswith("Do not fly before it is cured.")
     assert severity(d) == "error"
     assert dangers(diagnosis()) == []
+
+
+def test_an_accelerometer_that_died_in_flight_is_said_first_and_is_a_danger():
+    d = diagnosis(effects=(effect(),), unused=(Unused(80.0, 140.0, "imu_stuck"),))
+    assert headline(d).startswith("The accelerometer repeated one reading in flight. ")
+    assert headline(d).endswith(headline(diagnosis(effects=(effect(),))))
+    (said,) = dangers(d)
+    assert said.endswith("Do not fly before it is cured.")
+    assert severity(d) == "error"
+    others = diagnosis(unused=(Unused(80.0, 140.0, "few_satellites"),))
+    assert dangers(others) == []
+    # What is told of the six beside it is right, and has the word with it.
+    assert "from 80 s on, for 60 s" in judged(d).diagnosis.calibration.note
 
 
 def test_moments_that_were_not_used_are_said_once_each():

@@ -31,7 +31,8 @@ class Candidate:
     the offsets at one moment, or of the scales, that matters from ``worth`` on; other
     accelerometers may have been ``witness`` of it.  ``room_for``
     are effects that it is when some of its unknowns are told by the others.  Of two jumps the
-    ``rare`` one is taken where it is clearly likelier.  No size of what is
+    ``rare`` one is taken where it is clearly likelier.  At the force that was ``felt`` (3,), m/s^2,
+    on average since then, it is the jump of the offset that they have seen.  No size of what is
     ``positive`` can be negative; what it is then may be an unknown of every model (``mirrored``).
     """
 
@@ -44,6 +45,7 @@ class Candidate:
     worth: float = MATTERS_OFFSET
     rare: bool = False
     witness: Witness | None = None
+    felt: Array | None = None
     room_for: tuple[str, ...] = ()
     positive: bool = False
     mirrored: tuple[str, ...] = ()
@@ -67,7 +69,8 @@ class Candidate:
         unknowns, gain = len(self.index), self._gain(fitter, before, after)
         if self.witness is None:
             return surprise(gain.fall, unknowns, self.places, gain.variance, gain.freedom)
-        return surprise(self.witness.gain + gain.weakened, unknowns, self.witness.places)
+        seen = self.witness.gain - self._unseen(fitter, after, self.witness)
+        return surprise(seen + gain.weakened, unknowns, self.witness.places)
 
     def merit(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """The score, of what cannot be only by as much as it is clearly more than of what can."""
@@ -83,7 +86,20 @@ class Candidate:
         """
         if self.witness is None:
             return inf
-        return self._gain(fitter, before, after).weakened + self.witness.blame
+        against = self._unseen(fitter, after, self.witness)
+        return self._gain(fitter, before, after).weakened + self.witness.blame - against
+
+    def _unseen(self, fitter: Fitter, after: Fit, witness: Witness) -> float:
+        """What others say against the size that ``after`` has.
+
+        They have seen a jump of the offset, whose size is what is expected of one.  One of the
+        scale is as much at the force that was felt, and is nothing that they have seen where it
+        is another one: least of all where it is none.
+        """
+        if self.felt is None:
+            return 0.0
+        size = (after.theta[self.sizes] - fitter.absent[self.sizes]) * self.felt
+        return witness.against(size)
 
     def _gain(self, fitter: Fitter, before: Fit, after: Fit) -> Gain:
         gain = fitter.gain_by(self.index, before, after)

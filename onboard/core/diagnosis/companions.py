@@ -91,6 +91,7 @@ class Companions:
     def __init__(self, everyone: Mapping[int, Companion]) -> None:
         """Take accelerometers that have flown, by number."""
         self._pairs: dict[tuple[int, int], _Pair] = {}
+        self._scale_sigma = {imu: one.prior_sigma[:3] for imu, one in everyone.items()}
         self.imus = tuple(sorted(everyone))
         for a, b in combinations(self.imus, 2):
             one, other = everyone[a], everyone[b]
@@ -159,6 +160,8 @@ class Companions:
         told = self._told(imu, t)
         others = max(float(self._told(b, t).gain[i]) for b in self.imus if b != imu)
         gain, sigma = float(told.gain[i]), 1.0 / np.sqrt(told.information[i] + LARGEST**-2)
+        # They are compared with the scales in force: what is read by a wrong one is as wrong.
+        sigma = np.hypot(sigma, told.size[i] * self._scale_sigma[imu])
         return Witness(gain, len(t), gain - others, told.size[i], sigma)
 
     def _told(self, imu: int, t: Array) -> _Told:

@@ -139,8 +139,10 @@ class Pieces:
         parts = np.array_split(np.arange(len(blocks)), min(MOST_PARTS, len(blocks)))
         sums = [total([blocks[i] for i in part]) for part in parts]
         prior = 1.0 / model.prior_sigma**2
-        # Of a part alone noise may be more than there is: what is left must stay a variance.
-        N = np.array([p.N - share_of_gram(p, np.diag(prior)) * p.G for p in sums])
+        # Of a part alone noise may be more than there is: what is left must stay a variance, with
+        # a part's share of the prior, which all of them have once.
+        own = np.diag(prior) / len(sums)
+        N = np.array([p.N - share_of_gram(p, own) * p.G for p in sums])
         b = np.array([p.b for p in sums])
         asked = b.sum(axis=0) + prior * model.prior
         theta = np.linalg.solve(N.sum(axis=0) + np.diag(prior), asked)
@@ -195,7 +197,8 @@ class Pieces:
         C = np.linalg.inv(self.N.sum(axis=0) + np.diag(self.prior))
         rows, s = self.N[:, own], self.s[:, own]
         J = rows[:, :, own] - rows @ C @ rows.transpose(0, 2, 1)
-        told = np.linalg.eigvalsh(J)[:, 0] > ROUNDING * np.trace(rows[:, :, own].sum(axis=0))
+        most = rows[:, :, own].sum(axis=0) + np.diag(self.prior[own])  # without it, maybe nothing
+        told = np.linalg.eigvalsh(J)[:, 0] > ROUNDING * np.trace(most)
         J[~told] = np.eye(len(own))  # of which it knows nothing
         gains: Array = np.einsum("pi,pi->p", s, np.linalg.solve(J, s[..., None])[..., 0])
         return np.where(told, gains, 0.0)

@@ -231,6 +231,7 @@ def candidates_of(made: Examination, family: Effect) -> list[Candidate]:
 def candidate_of(made: Examination, family: Effect) -> Candidate:
     """A family of an examination as a candidate."""
     jump, of_scale = family.onset is not None, isinstance(family, ScaleStep)
+    witness = family.witness if isinstance(family, BiasStep | ScaleStep) else None
     return Candidate(
         family.effect,
         tuple(made.indices(family)),
@@ -240,8 +241,17 @@ def candidate_of(made: Examination, family: Effect) -> Candidate:
         jump=jump,
         worth=MATTERS_SCALE if of_scale else MATTERS_OFFSET,
         rare=of_scale,
-        witness=family.witness if isinstance(family, BiasStep | ScaleStep) else None,
+        witness=witness,
+        felt=_felt_since(made, family.onset) if of_scale and witness is not None else None,
         room_for=family.room_for,
         positive=family.positive,
         mirrored=family.goes_below,
     )
+
+
+def _felt_since(made: Examination, moment: float | None) -> Array:
+    """(3,) what the accelerometer read on average from a moment (s) on, m/s^2: sensor axes."""
+    scale, beta = np.split(made.point.six, 2)
+    parts = [b.segment.raw_s[b.segment.t >= (moment or 0.0)] for b in made.batches]
+    out: Array = scale * np.concatenate(parts).mean(axis=0) + beta
+    return out

@@ -101,6 +101,10 @@ class Mismatch:
         return self.leaps > 0.5 * self.fixes
 
 
+REPEATED = "imu_stuck"
+"""Why flight was not used whose accelerometer repeated one reading."""
+
+
 @dataclass(frozen=True, slots=True)
 class Unused:
     """Flight whose fixes were not used: why, and whether inertia contradicts them.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.diagnosis.limits import SAME_FIX_S
-from onboard.core.diagnosis.records import Unused
+from onboard.core.diagnosis.records import REPEATED, Unused
 from onboard.core.filter.refused import PER_SECOND
 from onboard.core.filter.refused import Refused as RefusedVelocities
 from onboard.core.gps.distrust import Distrust, RefusedFixes
@@ -153,7 +153,7 @@ def contradicted(
 
 def repeated(stretches: Sequence[tuple[float, float]], t0: float) -> tuple[Unused, ...]:
     """Where the accelerometer repeated one reading, s since ``t0``."""
-    return tuple(Unused(start - t0, end - t0, "imu_stuck") for start, end in stretches)
+    return tuple(Unused(start - t0, end - t0, REPEATED) for start, end in stretches)
 
 
 def _asked(batches: Sequence[Batch], gates: RefusedVelocities) -> Iterator[tuple[float, bool]]:

@@ -50,8 +50,8 @@ class Standing:
     """Stretches in which nothing moved, by accelerometer."""
 
     _open: dict[int, _Stretch] = field(default_factory=dict)
-    _means: dict[int, list[tuple[Array, SixParameters | None]]] = field(default_factory=dict)
-    """Mean force as reported, and the parameters in force, where they were known."""
+    _means: dict[int, list[tuple[float, Array, SixParameters | None]]] = field(default_factory=dict)
+    """Since when, s, mean force as reported, and the parameters in force, where they were known."""
     _waiting: dict[int, list[tuple[float, ...]]] = field(default_factory=dict)
 
     def hear(self, imu: int, t: Array, rows: Array, parameters: ParametersInForce) -> None:
@@ -105,10 +105,12 @@ class Standing:
             return
         six = parameters.six(imu) if parameters.known(imu) else None
         known = self._means.setdefault(imu, [])
-        known.append((mean[3:], six))
+        known.append((stretch.first, mean[3:], six))
         del known[:-MOST_STANDS]
 
-    def of(self, calibration: Calibration, parameters: ParametersInForce) -> AtRest | None:
+    def of(
+        self, calibration: Calibration, parameters: ParametersInForce, dead_from: float = math.inf
+    ) -> AtRest | None:
         """What an accelerometer reads there by its calibration; None if nobody saw it standing.
 
         Asked at the end: the stretch that is not over is taken as it is.
@@ -116,12 +118,14 @@ class Standing:
         Args:
             calibration: of the accelerometer.
             parameters: in force, also where nobody knew them yet.
+            dead_from: since when, s, it may measure nothing: what it reads at rest may be one
+                reading for good reason, so only flight tells.
         """
         imu = calibration.imu
         self.catch_up(imu, parameters)
         if (stretch := self._open.pop(imu, None)) is not None:
             self._over(imu, stretch, parameters)
-        means = self._means.get(imu, [])
+        means = [(mean, six) for t, mean, six in self._means.get(imu, []) if t < dead_from]
         covariance = np.array(calibration.covariance)
         if len(means) < FEWEST_STANDS or not np.all(np.isfinite(covariance)):
             return None

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from onboard.core.diagnosis.constancy import Constant, Growth, Pieces, changes
+from onboard.core.maths.blocks import Block
 from onboard.core.maths.chi_square import survival
+from onboard.core.maths.sums import NormalSums
 from tests.core.diagnosis.problems import BLOCK_S, Columns, Problem, drawn
 
 BLOCKS = 16
@@ -75,6 +77,24 @@ def test_values_of_each_part_are_those_of_least_squares():
     assert sigmas.ravel() == pytest.approx(np.sqrt(variance[-12:]), rel=1e-3)
     assert freed.square == pytest.approx(misfit(fuller, y), rel=1e-3)
     assert freed.rows == pytest.approx(BLOCKS * ROWS - 12, abs=0.1)
+
+
+def test_of_what_is_all_noise_no_part_claims_the_prior_that_all_have_once():
+    """Of each part alone the noise is more than there is; sigmas of all of them are numbers."""
+    made = flight(3)
+    made.h[..., 10] *= 1e-3  # so little that its prior knows more
+    noisy = []
+    for block in made.blocks:
+        G = np.zeros_like(block.sums.N)
+        G[10, 10] = 2.0 * block.sums.N[10, 10]
+        of = block.sums
+        sums = NormalSums(of.N, of.b, G, of.residual(np.zeros(len(G))), of.rows)
+        noisy.append(Block(block.start, block.end, sums))
+    pieces = Pieces.of(noisy, made.model)
+    assert np.all(np.linalg.eigvalsh(pieces.N.sum(axis=0) + np.diag(pieces.prior)) > 0.0)
+    for own in ((6,), (7, 8, 9), (10,)):
+        assert np.all(pieces.freed(own)[2] > 0.0)
+        assert np.all(np.isfinite(pieces.apart(own)))
 
 
 def test_by_chance_the_gain_is_chi_square():

@@ -56,6 +56,17 @@ def test_the_right_six_read_gravity_whatever_the_attitude(down_b):
     assert got.seconds == 20.0
 
 
+def test_what_died_in_flight_is_not_asked_what_it_reads_after_it():
+    standing, known = Standing(), parameters()
+    standing.hear(1, *stood((0.0, 0.0, 1.0), 21.0), known)
+    dead = np.tile([0.0, 0.0, 0.0, 3.0, 3.0, 3.0], (2000, 1))
+    standing.hear(1, 300.0 + 0.02 * np.arange(2000), dead, known)
+    assert standing.of(calibration(TRUE), known).estimate < -4.0
+    got = standing.of(calibration(TRUE), known, 200.0)
+    assert got.estimate == pytest.approx(0.0, abs=2e-3)
+    assert got.seconds == 20.0
+
+
 def test_its_sigma_is_that_of_the_estimate_along_gravity():
     """As errors of the six drawn from their covariance scatter it."""
     standing, known = Standing(), parameters()

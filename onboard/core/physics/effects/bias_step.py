@@ -19,6 +19,9 @@ from onboard.core.physics.wording import jumped
 LARGEST = 3.0
 """m/s^2; a sensor that jumps by more is broken and not miscalibrated."""
 
+RANGE = 157.0
+"""m/s^2; a sensor that other ones have seen break may read all that it can, 16 g [data sheet]."""
+
 SHARED_CURE = Cure(
     "look at what all accelerometers share, for each asks for this jump: the mount of "
     "the autopilot, GPS, the compass, a blow"
@@ -42,6 +45,14 @@ class Witness:
     blame: float
     size: Array
     sigma: Array
+
+    def against(self, size: Array) -> float:
+        """What they say against another size (3,), m/s^2: by how much their gain is less.
+
+        The level of their noise is found with it, so that is a logarithm.
+        """
+        n = self.places
+        return float(n * np.sum(np.log1p(((size - self.size) / self.sigma) ** 2 / n)))
 
 
 class BiasStep(Effect):
@@ -86,6 +97,7 @@ class BiasStep(Effect):
         made.take_axes("m/s^2", LARGEST)
         made.witness = witness or self.witness
         if made.witness is not None:
+            made.plausible = (RANGE,) * 3
             seen = zip(made.unknowns, made.witness.size, made.witness.sigma, strict=True)
             made.unknowns = tuple(
                 Unknown(u.name, u.unit, float(size), min(float(sigma), LARGEST))
