@@ -77,6 +77,7 @@ class Flight:
         place: (n,) of each step in the history.
         unheard_s: how long in the air commands or airspeed were not recorded, which is left out, s.
         dead_s: how long in the air the airspeed sensor repeated one reading, s.
+        lost_s: how long in the air nobody knows its velocity, which is left out, s.
     """
 
     t: Array
@@ -107,6 +108,7 @@ class Flight:
     place: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unheard_s: float = 0.0
     dead_s: float = 0.0
+    lost_s: float = 0.0
 
     def __post_init__(self) -> None:
         """One recording, in a wind that nobody measured, where nothing else is said."""
@@ -212,7 +214,8 @@ def flight_of(
     joined = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     hit = np.linalg.norm(joined["f_b"], axis=1) > CONTACT_M_S2
     flown = ~inside(joined["t"], grounded) & ~hit
-    air = flown & (joined["known"] > 0.0)
+    lost = joined["lost"] > 0.0
+    air = flown & ~lost & (joined["known"] > 0.0)
     dead = inside(joined["t"], list(signals.airspeed_dead))
     if not air.any():
         return None
@@ -240,8 +243,9 @@ def flight_of(
         shaken=joined["shaken"],
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
         history=History(joined["commands"], joined["piece"].astype(np.int64)),
-        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air & ~dead)),
+        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air & ~dead & ~lost)),
         dead_s=STEP_S * float(np.count_nonzero(flown & dead)),
+        lost_s=STEP_S * float(np.count_nonzero(flown & lost)),
     )
     return flight.cut(air)
 
@@ -286,6 +290,7 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
     )
     return {
         "known": (mean(lost.astype(np.float64)) == 0.0).astype(np.float64),
+        "lost": mean(m.lost.astype(np.float64)),
         "t": m.t[0] + (steps + 0.5) * STEP_S,
         "piece": np.full(n, float(number)),
         "f_b": f_b,
