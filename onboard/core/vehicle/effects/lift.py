@@ -14,9 +14,6 @@ from onboard.core.vehicle.plane_airframe import PlaneAirframe
 FLOOR_SHARE = 0.1
 """Of the nominal coefficients: what moves a plane's attitude by less than half a degree [use]."""
 
-TINY = 1e-6
-"""m/s^2: a wing at rest has no lift [physics]."""
-
 
 class Lift(Effect):
     """``c_lift_0 + c_lift_a alpha``, across the flow."""
@@ -52,7 +49,7 @@ class Lift(Effect):
         air.pressure = self._frame.pressure(air.rho, speed)
         air.lift, air.slope = values[0] + values[1] * air.alpha, values[1]
         # What the angle scatters by is of the air, whatever slope is tried for the wing.
-        air.scatter = air.shaken / np.maximum(air.pressure * self._frame.c_lift_a, TINY) ** 2
+        air.scatter = self._frame.scatter(air.shaken, air.pressure)
         sin, cos = np.sin(air.alpha), np.cos(air.alpha)
         # Means over angles that scatter: half of the second derivatives times their square.
         steady, more = air.lift * (1.0 - 0.5 * air.scatter), air.slope * air.scatter
