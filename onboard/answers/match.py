@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from onboard.answers.flown import FlownRecording, flown
+from onboard.answers.match_left_out import of_a_sensor, of_outages, of_rotors, of_velocity
 from onboard.answers.match_settings import Setting, settings_of
 from onboard.answers.same_flight import refuse_copies, refuse_one_flight_twice, refuse_other_boards
 from onboard.answers.sensor_level import TIMING_NAMES, sensor_differences
@@ -25,7 +26,7 @@ from onboard.core.vehicle.effects.voltage_sag import HELD
 from onboard.core.vehicle.flight import Flight, flight_of
 from onboard.core.vehicle.kind import kind_by_motion
 from onboard.core.vehicle.lift_rotors import on_wings, unseen
-from onboard.core.vehicle.limits import APART, FEWEST_STEPS, TOLD_S
+from onboard.core.vehicle.limits import APART, FEWEST_STEPS
 from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.plane_match import match_plane
@@ -215,9 +216,10 @@ def vehicle_level(
         return VehicleMatch(kind or "unknown", not_testable=absent, note=why)
     sigma = np.stack([r.sensors.force_sigma for r in (recording, *others)])
     said = (
-        _of_rotors(carried_s),
-        _of_outages(flight, kind),
-        _of_a_sensor(flight, kind),
+        of_rotors(carried_s),
+        of_outages(flight, plane=kind in PLANES),
+        of_velocity(flight),
+        of_a_sensor(flight, plane=kind in PLANES),
         str(doubt),
     )
     flight = joined([flight, *(_further(other, kind, airframe) for other in others)])
@@ -270,25 +272,6 @@ def _further(recording: FlownRecording, kind: str, airframe: CopterAirframe) -> 
 def _doubt(recording: FlownRecording, pieces: Sequence[Motion]) -> Contradiction:
     """A force that is the slope of the velocity contradicts nothing."""
     return Contradiction() if recording.derived else contradiction([m.fixed for m in pieces])
-
-
-def _of_rotors(seconds: float) -> str:
-    """That flight was left out in which upright rotors turned."""
-    left_out = f"upright rotors turned for {seconds:.0f} s, of which nothing is told"
-    return left_out if seconds else ""
-
-
-def _of_outages(flight: Flight, kind: str) -> str:
-    """That flight was left out of which it is not known what was commanded, or its airspeed."""
-    what = "outputs" if kind in COPTERS else "outputs or airspeed"
-    missing = f"{what} are missing for {flight.unheard_s:.0f} s, of which nothing is told"
-    return missing if flight.unheard_s >= TOLD_S else ""
-
-
-def _of_a_sensor(flight: Flight, kind: str) -> str:
-    """That a plane's airspeed sensor has died."""
-    dead = f"the airspeed sensor repeats one reading for {flight.dead_s:.0f} s, which is not used"
-    return dead if kind in PLANES and flight.dead_s >= TOLD_S else ""
 
 
 def _noted(found: VehicleMatch, *said: str) -> VehicleMatch:

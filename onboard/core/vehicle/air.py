@@ -22,6 +22,8 @@ class Air:
         wind_n: (n, 3) towards north, east, down, m/s.
         gust_n: (3,) what is added to it to see how sensitive the force is, m/s.
         gust_variance: of the air along each axis, m^2/s^2; one, or (n,).
+        shaken: (n,) mean square of a wing's force across the flow, by gusts within the steps,
+            m^2/s^4.
         turned_n: (n, 3) by which the recorded attitude is turned too far, about north, east and
             down, rad; None where it is right.
         through: (n,) flow through the rotors beside that of the velocity through the air, m/s.
@@ -38,6 +40,8 @@ class Air:
         force_b: (n, 3 or 4) predicted specific force, m/s^2, and airspeed where there is one, m/s.
         alpha, pressure, lift: (n,) of a plane: angle of attack (rad), specific force by coefficient
             (m/s^2), coefficient of lift.
+        scatter, slope: (n,) mean square of what gusts within the steps add to alpha, rad^2, and the
+            slope of the lift, 1/rad.
     """
 
     def __init__(self, flight: Flight, volts: Array | None = None, columns: int = 3) -> None:
@@ -49,6 +53,7 @@ class Air:
             self.wind_n[:, :2] += np.nan_to_num(flight.measured_wind[:, :2])
         self.gust_n = np.zeros(3)
         self.gust_variance: Array | float = 0.0
+        self.shaken: Array | float = 0.0
         self.turned_n: Array | None = None
         self.through: Array | float = 0.0
         self.tilt = (0.0, 0.0)
@@ -60,7 +65,8 @@ class Air:
         self.thrust: Array | None = None
         self.pull = np.zeros(n)
         self.force_b = np.zeros((n, columns))
-        self.alpha = self.pressure = self.lift = np.zeros(n)
+        self.alpha = self.pressure = self.lift = self.scatter = np.zeros(n)
+        self.slope = 0.0
         self._u_b: Array | None = None
         self._square_b: Array | None = None
 

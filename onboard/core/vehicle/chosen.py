@@ -4,8 +4,9 @@ An effect is needed if chi-square falls by more than chance gives to its number 
 the number of effects that were tried, if it falls on flight that was not fitted, and if the
 difference from the nominal airframe matters beyond its uncertainty.  Beside it are free the others
 that were chosen, and those that the flight could not have shown: nobody knows that they are
-nominal.  As told, with everything free, it must differ by more than matters, too.  What passes
-while all others are nominal is one of several that may be it: no name, and not *explained*.
+nominal.  As told, with everything free, it must differ by more than matters, too; and surely, where
+another effect would do as well.  What passes while all others are nominal is one of several that
+may be it: no name, and not *explained*.
 
 All effects are the choice to begin with, and the needless are dropped.  Effects that undo each
 other (more thrust by a curve of less) are only seen together; for both a third would be taken in.
@@ -73,14 +74,35 @@ def choose(choices: Choices) -> Chosen:
             break
         counted = {n: _counted(choices, beside, n, gains[n]) for n in passing}
         chosen.append(max(passing, key=lambda n: counted[n] - CREDIT * len(fit.model.indices(n))))
-    chosen, gains = _pruned(choices, chosen, untestable, level)
-    rivals = {n: _rivals(choices, chosen, n) for n in chosen}
+    chosen, gains, rivals = _settled(choices, chosen, untestable, level)
     effects = tuple(sorted(chosen, key=lambda n: -gains[n]))
     suspected = _suspected(choices, chosen, level)
     hidden = () if fit.turned is None else candidates
     partly = tuple(n for n in hidden if any(_untestable(fit, fit.model.indices(n))))
     together = _together(choices, effects, suspected, level)
     return Chosen(effects, gains, rivals, untestable, suspected, partly, together)
+
+
+def _settled(
+    choices: Choices, chosen: list[str], untestable: Sequence[str], level: float
+) -> tuple[list[str], dict[str, float], dict[str, tuple[str, ...]]]:
+    """Those that are needed and known, what each gains, and its rivals.
+
+    The score takes all others for nominal.  Where one of those would do as well, that is no
+    knowledge, and what is known of the number is what is told, with everything free: if it may as
+    well be nominal, nobody knows which of the two it is, and neither has a name.
+    """
+    while True:
+        chosen, gains = _pruned(choices, chosen, untestable, level)
+        rivals = {n: _rivals(choices, chosen, n) for n in chosen}
+        indices = choices.fit.model.indices
+        unknown = [
+            n for n in chosen if rivals[n] and not _matters(choices.fit, indices(n), choices.told)
+        ]
+        if not unknown:
+            return chosen, gains, rivals
+        weakest = min(unknown, key=lambda n: gains[n])
+        chosen = _without(chosen, weakest)
 
 
 def _together(
@@ -241,9 +263,13 @@ def _pruned(
         if not needless:
             return chosen, gains
         weakest = min(needless, key=lambda n: needless[n])
-        chosen = [
-            c for c in chosen if c != weakest and _needs(c, [k for k in chosen if k != weakest])
-        ]
+        chosen = _without(chosen, weakest)
+
+
+def _without(chosen: Sequence[str], name: str) -> list[str]:
+    """The others, as far as they do without it."""
+    rest = [c for c in chosen if c != name]
+    return [c for c in rest if _needs(c, rest)]
 
 
 def _rivals(choices: Choices, chosen: Sequence[str], name: str) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from onboard.core.vehicle.block_sums import BlockSums, total
 from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.drag import Drag
+from onboard.core.vehicle.effects.gust_lift import GustLift
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
 from onboard.core.vehicle.effects.propulsion import Propulsion
@@ -125,6 +126,7 @@ def _told_ahead(model: ForceModel) -> list[int]:
     at = 0
     for effect in model.effects:
         bent = isinstance(effect, Beyond) and effect.law.axes == (AHEAD,)
+        bent = bent or isinstance(getattr(effect, "each", effect), GustLift)
         if bent or isinstance(effect, Drag | SlipDrag | Propulsion | PropellerInflow):
             out += range(at, at + len(effect.unknowns))
         at += len(effect.unknowns)

@@ -19,7 +19,7 @@ from onboard.core.vehicle.trajectory import Motion
 _BY_STEP = (
     *("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho"),
     *("outputs", "commands", "battery", "airspeed", "ekf_wind", "measured_wind", "part"),
-    *("place", "unsure"),
+    *("place", "unsure", "shaken"),
 )
 """Fields that have a value for each step."""
 DRIFT = 3
@@ -70,12 +70,14 @@ class Flight:
         unsure: (n, 4) a standard deviation of what the sensor level leaves of the force as the load
             changes, body axes, m/s^2, each with the load's sign, and of the heading as it drifts,
             rad.
+        shaken: (n,) mean square of the force along z about its mean within a step, m^2/s^4.
         step_s: length of a step, s.
         ground_seen: whether it began or ended on the ground, so that heights above it are known.
         history: of the commands; None where they are those of the flight alone.
         place: (n,) of each step in the history.
         unheard_s: how long in the air commands or airspeed were not recorded, which is left out, s.
         dead_s: how long in the air the airspeed sensor repeated one reading, s.
+        lost_s: how long in the air nobody knows its velocity, which is left out, s.
     """
 
     t: Array
@@ -98,6 +100,7 @@ class Flight:
     measured_wind: Array = field(default_factory=lambda: np.zeros((0, 0)))
     part: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unsure: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    shaken: Array = field(default_factory=lambda: np.zeros(0))
     rest_volts: float = math.nan
     step_s: float = STEP_S
     ground_seen: bool = True
@@ -105,6 +108,7 @@ class Flight:
     place: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unheard_s: float = 0.0
     dead_s: float = 0.0
+    lost_s: float = 0.0
 
     def __post_init__(self) -> None:
         """One recording, in a wind that nobody measured, where nothing else is said."""
@@ -115,6 +119,8 @@ class Flight:
             object.__setattr__(self, "measured_wind", np.zeros((n, 0)))
         if len(self.unsure) != n:
             object.__setattr__(self, "unsure", np.zeros((n, 4)))
+        if len(self.shaken) != n:
+            object.__setattr__(self, "shaken", np.zeros(n))
         if len(self.place) != n:
             object.__setattr__(self, "place", np.arange(n))
 
@@ -208,7 +214,8 @@ def flight_of(
     joined = {name: np.concatenate([p[name] for p in parts]) for name in parts[0]}
     hit = np.linalg.norm(joined["f_b"], axis=1) > CONTACT_M_S2
     flown = ~inside(joined["t"], grounded) & ~hit
-    air = flown & (joined["known"] > 0.0)
+    lost = joined["lost"] > 0.0
+    air = flown & ~lost & (joined["known"] > 0.0)
     dead = inside(joined["t"], list(signals.airspeed_dead))
     if not air.any():
         return None
@@ -233,10 +240,12 @@ def flight_of(
         ekf_wind=joined["ekf_wind"],
         measured_wind=joined["measured_wind"],
         unsure=joined["unsure"],
+        shaken=joined["shaken"],
         rest_volts=_before(signals.battery, float(joined["t"][air][0])),
         history=History(joined["commands"], joined["piece"].astype(np.int64)),
-        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air & ~dead)),
+        unheard_s=STEP_S * float(np.count_nonzero(flown & ~air & ~dead & ~lost)),
         dead_s=STEP_S * float(np.count_nonzero(flown & dead)),
+        lost_s=STEP_S * float(np.count_nonzero(flown & lost)),
     )
     return flight.cut(air)
 
@@ -261,7 +270,7 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
         out: Array = np.add.reduceat(x, first, axis=0) / counts.reshape(shape)
         return out
 
-    R_bn = np.swapaxes(m.R_nb, -1, -2)
+    f_b, R_bn = mean(m.f_b), np.swapaxes(m.R_nb, -1, -2)
     v_b = np.einsum("nij,nj->ni", R_bn, m.v_n)
     height = mean(m.height)
     n = len(steps)
@@ -281,9 +290,11 @@ def _binned(m: Motion, signals: Signals, commands: Stream, number: int) -> dict[
     )
     return {
         "known": (mean(lost.astype(np.float64)) == 0.0).astype(np.float64),
+        "lost": mean(m.lost.astype(np.float64)),
         "t": m.t[0] + (steps + 0.5) * STEP_S,
         "piece": np.full(n, float(number)),
-        "f_b": mean(m.f_b),
+        "f_b": f_b,
+        "shaken": mean((m.f_b[:, 2] - np.repeat(f_b[:, 2], counts)) ** 2),
         "w_b": mean(m.w_b),
         "R_bn": mean(R_bn),
         "v_b": mean(v_b),

@@ -178,6 +178,8 @@ across the way, wandering for as long as nobody turns [data sheet]."""
 PROPELLER_BEND: Final = 0.3
 """Of the thrust at a standstill, by which that of a propeller is off a straight line over the
 advance ratio, at the ratio where it pulls nothing: standard deviation [data sheet]."""
+MOST_OF_ROTORS: Final = 0.5
+"""Of what rotors pull, that may be of something else: a copter is carried by them [physics]."""
 MOST_BY_GUSTS: Final = 0.95
 """Share of what tells an unknown that gusts may make; past it nothing is known [probability]."""
 TOLD_S: Final = 1.0

@@ -38,6 +38,7 @@ from onboard.core.vehicle.remainder import (
     remainders,
     share_of,
 )
+from onboard.core.vehicle.rotor_doubt import rotor_doubt
 from onboard.core.vehicle.turbulence import Turbulence, turbulence_of
 from onboard.core.vehicle.windows import windows_of
 
@@ -194,7 +195,9 @@ def _finished(first: Fit) -> _Finished:
     fit = fit if felt is None else felt.fit
     if felt is not None or (sensed and turbulence.seen):
         fit = replace(fit, turned=turned_by_gusts(fit, turbulence.rms, felt))
-    fit = replace(fit, doubt=propeller_doubt(fit), answered=answered_by_commands(fit))
+    fit = replace(
+        fit, doubt=propeller_doubt(fit) + rotor_doubt(fit), answered=answered_by_commands(fit)
+    )
     return _Finished(plain, fit, kept, turbulence)
 
 

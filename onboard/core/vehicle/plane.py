@@ -15,6 +15,7 @@ from onboard.core.vehicle.effects.beyond import Beyond
 from onboard.core.vehicle.effects.beyond_wings import WINGS
 from onboard.core.vehicle.effects.drag import Drag
 from onboard.core.vehicle.effects.effect import Effect
+from onboard.core.vehicle.effects.gust_lift import GustLift
 from onboard.core.vehicle.effects.lift import Lift
 from onboard.core.vehicle.effects.own import own
 from onboard.core.vehicle.effects.propeller_inflow import PropellerInflow
@@ -169,6 +170,7 @@ def plane_model(
         *([AirDensity()] if float(np.ptp(flight.height)) > DENSITY_RANGE_M else []),
         own([AttitudeError(flight.attitude_sigma, s) for s in np.atleast_2d(force_sigma)]),
         ServoLag(),
+        own([GustLift() for _ in range(flight.parts)]),
         Lift(frame),
         Drag(frame),
         SlipDrag(),

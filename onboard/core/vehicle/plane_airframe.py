@@ -27,6 +27,9 @@ MASS_KG = 2.0
 HOVER_THROTTLE = 0.7
 """Throttle that carries the nominal plane's weight; neither is in the coefficient file."""
 
+LEAST_SLOPE = 1.0
+"""m/s^2 by a radian: a wing with less lift carries nothing, and tells no gust [physics]."""
+
 
 @dataclass(frozen=True, slots=True)
 class PlaneAirframe:
@@ -66,4 +69,17 @@ class PlaneAirframe:
     def pressure(self, rho: Array, speed: Array) -> Array:
         """(n,) specific force by coefficient, m/s^2: dynamic pressure times area by mass."""
         out: Array = 0.5 * rho * (rho / SEA_LEVEL_DENSITY) * np.square(speed) * self.s / MASS_KG
+        return out
+
+    def scatter(self, shaken: Array | float, pressure: Array) -> Array:
+        """(n,) mean square of the angle of attack about its mean, rad^2, by that of the lift.
+
+        Args:
+            shaken: (n,) mean square of the specific force across the flow, m^2/s^4.
+            pressure: (n,) as of :meth:`pressure`.
+        """
+        slope = np.abs(pressure * self.c_lift_a)
+        out: Array = np.where(
+            slope > LEAST_SLOPE, shaken / np.maximum(slope, LEAST_SLOPE) ** 2, 0.0
+        )
         return out

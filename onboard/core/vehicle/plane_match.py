@@ -21,7 +21,13 @@ from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.front import front_of
-from onboard.core.vehicle.limits import FEWEST_STEPS, MOST_BEYOND, RECEIVER_M_S, SURE
+from onboard.core.vehicle.limits import (
+    FEWEST_STEPS,
+    MOST_BEYOND,
+    RECEIVER_M_S,
+    SURE,
+    TOLD_S,
+)
 from onboard.core.vehicle.match_record import differences, not_testable_of, vehicle_match
 from onboard.core.vehicle.matching import Matched, likelier, matched
 from onboard.core.vehicle.model import ForceModel
@@ -69,9 +75,21 @@ def match_plane(flight: Flight, frame: PlaneAirframe, force_sigma: Array) -> Veh
         frame=_coefficients(found, frame),
         curves=plane_curves(found, frame),
     )
-    if silenced:
-        match = replace(match, note="; ".join(filter(None, (match.note, FALSE_SENSOR))))
+    said = (
+        match.note,
+        FALSE_SENSOR if silenced else "",
+        _stalled(told.counting(flight), frame, found),
+    )
+    match = replace(match, note="; ".join(filter(None, said)))
     return told.beside(match)
+
+
+def _stalled(flight: Flight, frame: PlaneAirframe, found: Matched) -> str:
+    """That flight was left out in which the wing has another law; empty where there is none."""
+    winds = found.fit.theta[found.model.indices("wind")].reshape(-1, 2)
+    seconds = flight.step_s * (len(flight) - len(unstalled(flight, frame, winds)))
+    said = f"the wing is stalled, or nearly so, for {seconds:.0f} s, of which nothing is told"
+    return said if seconds >= TOLD_S else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,7 +59,7 @@ def joined(flights: Sequence[Flight]) -> Flight:
         return out
 
     by_step = ("t", "piece", "f_b", "w_b", "R_bn", "v_b", "v_n", "height", "rho", "airspeed")
-    names = (*by_step, "measured_wind", "part", "unsure", *STREAMS)
+    names = (*by_step, "measured_wind", "part", "unsure", "shaken", *STREAMS)
     whole: dict[str, Any] = {name: together(name) for name in names}
     return replace(
         first,

@@ -17,13 +17,14 @@ from onboard.core.estimate.misread import Misread
 from onboard.core.inputs.limits import EVEN_MARGIN_S
 from onboard.core.inputs.reach import apart_of, reach_of
 from onboard.core.inputs.segments import Batch, Segment
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import rotation_from_vector, vector_from_rotation
 from onboard.core.vehicle.limits import (
     ATTITUDE_WANDER,
     FEWEST_FIXES,
     LEVELS_FROM,
+    UNCLEAR_M_S,
     VELOCITY_NOISE_M_S,
 )
 from onboard.core.vehicle.smoother import (
@@ -109,13 +110,15 @@ class Motion:
         R_nb: (n, 3, 3) attitude.
         v_n: (n, 3) velocity, m/s.
         height: (n,) above mean sea level, m.
-        velocity_sigma: of the velocity, m/s.
+        velocity_sigma: of the velocity where it is known, m/s.
         attitude_sigma: (3,) of the attitude, about north, east and down, rad.
         fixed: (k,) times of the fixes, s, and (k, 3) by how much their velocity is off that of
             force and recorded attitude, m/s, but for a constant.
         load_sigma: as that of the sensors.
         heading_drift: (n,) standard deviation of what the heading is off by more and more, with
             its sign from where it is known best, rad.
+        lost: (n,) whether its velocity is not known: no receiver holds it, for so long that it may
+            be off by more than :data:`~onboard.core.vehicle.limits.UNCLEAR_M_S`.
     """
 
     t: Array
@@ -129,9 +132,12 @@ class Motion:
     fixed: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 3)))
     load_sigma: Array = field(default_factory=lambda: np.zeros(3))
     heading_drift: Array = field(default_factory=lambda: np.zeros(0))
+    lost: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
-        """No drift where nothing is said of one."""
+        """No drift, and a velocity that is known, where nothing is said of either."""
+        if len(self.lost) != len(self.t):
+            object.__setattr__(self, "lost", np.zeros(len(self.t), dtype=bool))
         if len(self.heading_drift) != len(self.t):
             object.__setattr__(self, "heading_drift", np.zeros(len(self.t)))
 
@@ -155,6 +161,7 @@ class Motion:
             v_n=_at(t, self.t, self.v_n),
             height=np.interp(t, self.t, self.height),
             heading_drift=np.interp(t, self.t, self.heading_drift),
+            lost=np.interp(t, self.t, self.lost) > 0.0,
         )
 
 
@@ -212,6 +219,9 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
     v_n = v_n + _at(t, true_t, errors.x[:, V])
     R = rotation_from_vector(_at(t, true_t, errors.x[:, PSI])) @ R
     attitude_sigma, heading = attitude_known(steps, levels, start)
+    variance = errors.variance[:, V]
+    unsure = np.sqrt(np.max(variance, axis=1))
+    known = unsure <= UNCLEAR_M_S
     return Motion(
         t,
         f_b,
@@ -219,11 +229,12 @@ def _motion(run: Sequence[Batch], sensors: Sensors) -> Motion | None:
         R,
         v_n,
         np.interp(t, true_t, fix_h),
-        float(np.max(errors.sigma[V])),
+        math.sqrt(float(np.max(np.mean(variance[known if known.any() else ...], axis=0)))),
         attitude_sigma,
         (true_t, fix_v - average),
         sensors.load_sigma,
         np.interp(t, true_t, _drift(true_t, heading, float(start[2]))),
+        np.interp(t, true_t, unsure) > UNCLEAR_M_S,
     )
 
 

@@ -199,7 +199,9 @@ def _felt(fit: Fit) -> Turbulence:
     gust = coloured / (_kept(windows.length_s / noise.correlation_s) * max(abs(scale), 0.1))
     memory = 2.0 * (noise.correlation_s + windows.length_s)
     sigma = gust / math.sqrt(2.0 * max(len(flight) * flight.step_s / memory, 1.0))
-    return Turbulence(gust, sigma, evidence, SENSED_GUST_M_S, flight.velocity_sigma)
+    # What is read beyond the model is of the model's velocity, too.
+    floor = math.hypot(SENSED_GUST_M_S, flight.velocity_sigma)
+    return Turbulence(gust, sigma, evidence, floor, flight.velocity_sigma)
 
 
 def _kept(x: float) -> float:

@@ -159,3 +159,17 @@ def test_gusts_explain_no_more_than_gusts_of_their_size_do():
     assert match is not None
     assert {d.name for d in match.effects} == {"turbulence"}
     assert not match.explained
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sigma", "named"), [(0.01, True), (0.4, False)])
+def test_what_an_airspeed_sensor_reads_beyond_a_velocity_that_is_off_is_no_gust(sigma, named):
+    """An error of the velocity looks like air to the sensor; how large it may be is known."""
+    flight = plane_flight(seed=17, reading=1.0)
+    rng = np.random.default_rng(3)
+    wrong = np.stack([smooth(rng, len(flight), 0.35, 5.0) for _ in range(3)], axis=1)
+    flight.v_n[:] += wrong
+    flight.v_b[:] = np.einsum("nij,nj->ni", flight.R_bn, flight.v_n)
+    match = match_plane(replace(flight, velocity_sigma=sigma), PlaneAirframe(), SIGMA)
+    assert match is not None
+    assert ("turbulence" in {d.name for d in match.effects}) is named

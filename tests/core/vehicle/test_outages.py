@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from onboard.answers.match_left_out import of_velocity
 from onboard.core.vehicle.flight import flight_of
 from onboard.core.vehicle.limits import STEP_S
 from onboard.core.vehicle.signals import Signals, Stream
@@ -12,7 +13,7 @@ T = np.arange(0.0, 60.0, 0.02)
 HOLE = (20.0, 29.0)
 
 
-def motion():
+def motion(**change):
     """A minute of level flight."""
     n = len(T)
     return Motion(
@@ -24,6 +25,7 @@ def motion():
         np.full(n, 650.0),
         0.05,
         1e-3,
+        **change,
     )
 
 
@@ -55,6 +57,19 @@ def test_steps_in_an_outage_are_no_flight(kind, commands, airspeed):
     # The noise's memory does not reach across, the servos' does.
     assert list(np.unique(flight.piece)) == [0, 1]
     assert len(flight.history.commands) == pytest.approx(60.0 / STEP_S, abs=2)
+
+
+def test_steps_whose_velocity_nobody_knows_are_no_flight():
+    """No receiver held it for nine seconds: what is left of a force there is of no air."""
+    lost = (HOLE[0] < T) & (HOLE[1] > T)
+    signals = Signals(airspeed=stream(1), kind="plane")
+    flight = flight_of([motion(lost=lost)], signals, stream(2), [], 580.0)
+    assert not ((flight.t > HOLE[0]) & (flight.t < HOLE[1])).any()
+    assert flight.lost_s == pytest.approx(np.diff(HOLE)[0], abs=3 * STEP_S)
+    assert flight.unheard_s == 0.0
+    assert len(flight) * STEP_S == pytest.approx(60.0 - flight.lost_s, abs=2 * STEP_S)
+    assert "nobody knows the velocity for 9 s" in of_velocity(flight)
+    assert of_velocity(flown("plane", stream(2))) == ""
 
 
 @pytest.mark.parametrize("kind", ["copter", "plane"])

@@ -135,3 +135,15 @@ def test_elevons_are_an_elevator_and_no_rudder():
     got = outputs_of({1: 78.0, 2: 77.0, 3: 70.0}, us, reversed_=(1, 2))
     assert not got[:, 1].any()
     assert got[:, 2] == pytest.approx(0.5 * elevator / 500.0)
+
+
+def test_flight_past_the_stall_is_left_out_and_said():
+    """What a stalled wing does no coefficient of the file tells."""
+    flight = plane_flight(seed=47, seconds=150.0)
+    stalled = (flight.t > 120.0) & (flight.t < 129.0)
+    flight.v_b[stalled, 2] = 0.6 * flight.v_b[stalled, 0]
+    flight.v_n[:] = np.einsum("nji,nj->ni", flight.R_bn, flight.v_b)
+    match = matched(flight)
+    assert names(match) == set()
+    assert "the wing is stalled, or nearly so, for 9 s, of which nothing is told" in match.note
+    assert "stalled" not in matched(plane_flight(seed=47, seconds=150.0)).note

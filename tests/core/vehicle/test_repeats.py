@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from onboard.answers import match as match_module
+from onboard.answers.match_left_out import of_a_sensor
 from onboard.core.vehicle.repeats import measured
 from onboard.core.vehicle.signals import Stream
 from tests.core.vehicle.flights import plane_flight
@@ -72,5 +72,5 @@ def test_nothing_is_known_long_before_the_first_reading_and_after_the_last():
 @pytest.mark.parametrize(("kind", "told"), [("plane", True), ("copter", False)])
 def test_the_note_says_that_a_planes_sensor_has_died(kind, told):
     flight = replace(plane_flight(seconds=20.0), dead_s=12.0)
-    said = match_module._of_a_sensor(flight, kind)
+    said = of_a_sensor(flight, plane=kind == "plane")
     assert ("repeats one reading for 12 s" in said) is told

@@ -34,9 +34,13 @@ class Drag(Effect):
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the drag; after the lift."""
-        drag = air.pressure * (values[0] + values[1] * air.lift**2)
-        air.force_b[:, 0] -= drag * np.cos(air.alpha)
-        air.force_b[:, 2] -= drag * np.sin(air.alpha)
+        sin, cos = np.sin(air.alpha), np.cos(air.alpha)
+        # Means over angles that scatter, as of the lift.
+        steady = (values[0] + values[1] * air.lift**2) * (1.0 - 0.5 * air.scatter)
+        along = steady + values[1] * air.slope**2 * air.scatter
+        across = 2.0 * values[1] * air.lift * air.slope * air.scatter
+        air.force_b[:, 0] -= air.pressure * (along * cos - across * sin)
+        air.force_b[:, 2] -= air.pressure * (along * sin + across * cos)
 
     def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
         """Coefficients are by the airframe's mass; what is induced goes with the lift's square."""

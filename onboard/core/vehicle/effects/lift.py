@@ -47,9 +47,14 @@ class Lift(Effect):
         speed = np.linalg.norm(u, axis=1)
         air.alpha = np.arctan2(u[:, 2], u[:, 0])
         air.pressure = self._frame.pressure(air.rho, speed)
-        air.lift = values[0] + values[1] * air.alpha
-        air.force_b[:, 0] += air.pressure * air.lift * np.sin(air.alpha)
-        air.force_b[:, 2] -= air.pressure * air.lift * np.cos(air.alpha)
+        air.lift, air.slope = values[0] + values[1] * air.alpha, values[1]
+        # What the angle scatters by is of the air, whatever slope is tried for the wing.
+        air.scatter = self._frame.scatter(air.shaken, air.pressure)
+        sin, cos = np.sin(air.alpha), np.cos(air.alpha)
+        # Means over angles that scatter: half of the second derivatives times their square.
+        steady, more = air.lift * (1.0 - 0.5 * air.scatter), air.slope * air.scatter
+        air.force_b[:, 0] += air.pressure * (steady * sin + more * cos)
+        air.force_b[:, 2] -= air.pressure * (steady * cos - more * sin)
 
     def heavier(self, values: Sequence[float], log_ratio: float) -> list[float]:
         """Coefficients are by the airframe's mass."""
