@@ -21,7 +21,15 @@ from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.shaken import walk_s
-from onboard.core.inputs.expected_force import drowned, expected, spectrum, swung, tones, white
+from onboard.core.inputs.expected_force import (
+    drowned,
+    expected,
+    shaped,
+    spectrum,
+    swung,
+    tones,
+    white,
+)
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
@@ -227,10 +235,10 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
         if toneless.log_likelihood > sampled.log_likelihood:
             sampled, batches = toneless, toneless.batches
             density = np.maximum(density - tone, np.min(density, axis=0))
-    little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2)
+    little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2) and not sampled.found_noisy
     if little and not drowned(batches, density):
         return sampled
-    noise = np.minimum(white(density), _walk_s(sampled.noise, batches))
+    noise = shaped(density, _walk_s(sampled.noise, batches))
     felt = asked.examined(expected(batches, density, noise), sampled)
     return max(sampled, felt, key=lambda made: made.log_likelihood)
 

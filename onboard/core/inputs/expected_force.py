@@ -9,12 +9,13 @@ of the force is in no sum of samples (regression calibration: Carroll et al., *M
 Nonlinear Models*, 2006, chapter 4).  Of noise with the density ``q`` in samples with the density
 ``S`` of each frequency it is the zero-phase filter ``1 - q / S`` (Wiener 1949, non-causal).
 
-``S`` is measured over the flight.  ``q`` is the least of it at any frequency: white noise has no
-more than that, so a tone adds nothing, and vibration that a low-pass has shaped is left as it is.
-Whether it is noise at all, samples do not say: a vehicle that is really shaken, in turbulence or by
-its own motors, has a force as restless, and its receiver agrees with every sum of it.  Noise makes
-the velocity that is integrated walk, so that what the receiver finds of such a walk is the most
-that ``q`` can be; whether it is as much, is for the likelihood of what the receiver says to decide
+``S`` is measured over the flight.  Whether any of it is noise, samples do not say: a vehicle that
+is really shaken, in turbulence or by its own motors, has a force as restless, and its receiver
+agrees with every sum of it.  Noise makes the velocity that is integrated walk, so that what the
+receiver finds of such a walk is the most that ``q`` can be at frequencies that fixes follow.
+Above them an autopilot's low-pass takes of noise and force alike, and noise is no more than ``S``
+there either: it is the lesser of the two at each frequency.  So a tone adds nothing.  Whether it is
+as much, is for the likelihood of what the receiver says to decide
 (:mod:`onboard.core.diagnosis.cleared`).
 
 A *tone* is the other kind: a rotor that is governed, or a motor at constant speed, beats at one
@@ -62,6 +63,17 @@ def spectrum(batches: Sequence[Batch]) -> Array | None:
 def white(density: Array) -> Array:
     """(3,) density that white noise may have at the most, of a spectrum (bins, 3)."""
     out: Array = _averaged(density, FLOOR_BINS).min(axis=0)
+    return out
+
+
+def shaped(density: Array, walk: Array) -> Array:
+    """(bins, 3) density of white noise that a low-pass has shaped, at the most.
+
+    Args:
+        density: (bins, 3) of the samples.
+        walk: (3,) variance by which the velocity is found to walk in a second, (m/s)^2.
+    """
+    out: Array = np.minimum(_averaged(density, SPECTRUM_BINS), walk)
     return out
 
 

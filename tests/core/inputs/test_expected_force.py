@@ -5,7 +5,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from onboard.core.inputs.expected_force import drowned, expected, spectrum, swung, tones, white
+from onboard.core.inputs.expected_force import (
+    drowned,
+    expected,
+    shaped,
+    spectrum,
+    swung,
+    tones,
+    white,
+)
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 
 STEP, SECONDS = 0.02, 240.0
@@ -71,6 +79,36 @@ def test_what_is_left_is_in_no_sum_of_what_is_expected():
         ((f - samples) * (samples - f.mean(axis=0))).mean(axis=0) / sigma**2, -1.0, atol=0.1
     )
     assert np.all((f - got).std(axis=0) < 0.5 * sigma)
+
+
+def test_noise_that_a_low_pass_has_shaped_goes_by_what_the_velocity_walks():
+    """An autopilot's low-pass leaves none of it at the end of the spectrum, where white() looks."""
+    rng, sigma, pole = np.random.default_rng(4), 0.65, np.exp(-2.0 * np.pi * 4.0 * STEP)
+    f = manoeuvre()
+    noise = sigma * rng.normal(size=f.shape)
+    for _ in range(3):
+        noise = slowed(noise, pole)
+    flight = batches(f + noise)
+    density, walk = spectrum(flight), np.full(3, sigma**2 * STEP)
+    assert np.all(white(density) < 0.05 * walk)
+    left, before = (
+        (felt(expected(flight, density, q)) - f).std(axis=0)
+        for q in (shaped(density, walk), white(density))
+    )
+    assert np.all(left < 0.6 * before)
+    assert np.all(before > 0.9 * noise.std(axis=0))
+    # No more is taken than the velocity walks by.
+    little = expected(flight, density, shaped(density, 0.01 * walk))
+    assert np.all((felt(little) - f - noise).var(axis=0) < 0.01 * walk / STEP)
+
+
+def slowed(x, pole):
+    """Samples (n, 3) through a first-order low-pass."""
+    out, y = np.empty_like(x), np.zeros(x.shape[1])
+    for i, row in enumerate(x):
+        y = pole * y + (1.0 - pole) * row
+        out[i] = y
+    return out
 
 
 def test_quiet_samples_have_next_to_no_noise():
