@@ -340,9 +340,13 @@ def _still(live: dict[int, ImuTrack], fixes: Fixes) -> bool:
 
 
 def mean_step(t: Array) -> float:
-    """Mean time between samples at ``t`` (n,), s; a gap does not make the rest of them slow."""
+    """Mean time between samples at ``t`` (n,), s; inf if there are none so close.
+
+    A gap does not make the rest of them slow, nor a clock that begins anew the rest of them fast.
+    """
     steps = np.diff(t)
-    return float(np.mean(steps[steps <= IMU_GAP_S])) if np.any(steps <= IMU_GAP_S) else np.inf
+    close = steps[(steps >= 0.0) & (steps <= IMU_GAP_S)]
+    return float(np.mean(close)) if len(close) else np.inf
 
 
 def _pieces(

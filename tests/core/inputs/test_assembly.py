@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from onboard.core.inputs.assembly import Assembly, AssemblySettings
+from onboard.core.inputs.assembly import Assembly, AssemblySettings, mean_step
 from onboard.core.inputs.limits import (
     ATTITUDE_MARGIN_S,
     IMU_GAP_S,
@@ -164,3 +164,10 @@ def test_nothing_of_standing_is_handed_out():
         assembly.streams.fixes.add(fix(t), trusted=True)
     assert assembly.take(parameters, everything=True, grounded=True) == {}
     assert assembly.standing_s == pytest.approx(28.8, abs=0.21)
+
+
+@pytest.mark.parametrize(("step", "mean"), [(0.02, 0.02), (1.0, np.inf)])
+def test_a_clock_that_begins_anew_makes_no_stream_fast(step, mean):
+    """Telemetry at 1 Hz of a vehicle that was rebooted was told as one on the ground."""
+    boots = [np.arange(begin, begin + 50.0, step) for begin in (100.0, 3.0, 40.0)]
+    assert mean_step(np.concatenate(boots)) == pytest.approx(mean)
