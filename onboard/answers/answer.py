@@ -43,6 +43,9 @@ MOVED_SIGMAS = 2.0
 DIED = "the accelerometer repeated one reading; see to it before the next flight"
 """Said of one that has an estimate all the same, of before."""
 
+HOLES = "inertial samples are missing: log less, or to a faster card, or over a better link"
+"""Said where that took most of a flight."""
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -122,7 +125,7 @@ def judged(diagnosis: Diagnosis, parameters: Mapping[str, float] | None = None) 
     suspects = [e for e in diagnosis.effects if bearing_of(e.name) is not Bearing.HARMLESS]
     if not diagnosis.mismatch.supported:
         return Answer(_refused(diagnosis))
-    diagnosis = _with_what_died(_with_what_was_seen(diagnosis))
+    diagnosis = _with_what_is_missing(_with_what_died(_with_what_was_seen(diagnosis)))
     if diagnosis.verdict in {Verdict.UNEXPLAINED, Verdict.PARTLY_EXPLAINED}:
         found = ", ".join(dict.fromkeys(phrase_of(e) for e in suspects))
         missing = "the residual is not noise, and " + (
@@ -226,6 +229,14 @@ def _with_what_died(diagnosis: Diagnosis) -> Diagnosis:
         return diagnosis
     seconds = sum(u.end_s - u.start_s for u in dead)
     return _noted(diagnosis, f"from {dead[0].start_s:.0f} s on, for {seconds:.0f} s, {DIED}")
+
+
+def _with_what_is_missing(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis that notes that samples are missing around more fixes than were used."""
+    lost = diagnosis.calibration.rejected.get("imu_gap", 0)
+    if lost <= diagnosis.mismatch.fixes:
+        return diagnosis
+    return _noted(diagnosis, f"around {lost} fixes {HOLES}")
 
 
 def _uncalibrated(diagnosis: Diagnosis) -> Diagnosis:

@@ -12,9 +12,9 @@ from onboard.answers.same_flight import Track
 from onboard.answers.words import DISTRUST
 from onboard.core.estimate.result import Calibration, Coverage
 from onboard.core.gps.distrust import Distrust
-from onboard.core.inputs.assembly import mean_step
 from onboard.core.inputs.blocks import Block, Piece
 from onboard.core.inputs.boot_time import Boots
+from onboard.core.inputs.gaps import mean_step
 from onboard.core.inputs.limits import SLOWEST_IMU_HZ
 from onboard.core.inputs.samples import (
     FIX_3D,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.airborne import STILL_RATE_RAD_S, still
+from onboard.core.inputs.gaps import beside_gaps, mean_step, needed_of, pieces_of
 from onboard.core.inputs.gyroscopes import rates_at
 from onboard.core.inputs.limits import (
     ATTITUDE_MARGIN_S,
-    EVEN_MARGIN_S,
     FELT_M_S2,
     FEWEST_FIXES,
     FEWEST_SAMPLES,
@@ -196,8 +196,12 @@ class Assembly:
         if self._settings.slowest_imu_hz * mean_step(stamps) > 1.0:
             return []
         t = stamps - parameters.imu_delay
+        # The last one is the first of the next piece; samples that are there and stuck are no gap.
+        there = live[imu].arrays()[0] - parameters.imu_delay
+        lost = beside_gaps(there, fixes.t[:-1], reach) & trusted[:-1]
+        live[imu].refused["imu_gap"] += int(np.count_nonzero(lost))
         out: list[Batch] = []
-        for needed, inside in _pieces(t, fixes.t, reach):
+        for needed, inside in pieces_of(t, fixes.t, reach):
             gyro, turning = _with_rates(imu, live, stamps[needed], rows[needed], parameters)
             # Another gyroscope has another bias: the filter's belongs to the one before.
             same = self._gyro.get(imu, gyro) == gyro
@@ -214,7 +218,7 @@ class Assembly:
                 continue
             chosen = fixes.between(first, last + 1)
             followed = gyro == parameters.attitude_imu
-            cut = _needed(t[needed], chosen.t, reach)
+            cut = needed_of(t[needed], chosen.t, reach)
             segment = self._segment(
                 t[needed[cut]], turning[cut], parameters, imu, followed=followed
             )
@@ -337,41 +341,6 @@ def _still(live: dict[int, ImuTrack], fixes: Fixes) -> bool:
         if not np.any(stuck(stamps[during], told[-1], SAME_RAD_S)):
             return still(fixes.v_n, told[-1])
     return still(fixes.v_n, told[0])
-
-
-def mean_step(t: Array) -> float:
-    """Mean time between samples at ``t`` (n,), s; inf if there are none so close.
-
-    A gap does not make the rest of them slow, nor a clock that begins anew the rest of them fast.
-    """
-    steps = np.diff(t)
-    close = steps[(steps >= 0.0) & (steps <= IMU_GAP_S)]
-    return float(np.mean(close)) if len(close) else np.inf
-
-
-def _pieces(
-    t: Array, epochs: Array, reach: Reach
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Pieces without inertial gaps: indices of the samples needed, and of the fixes inside."""
-    breaks = np.flatnonzero(np.diff(t) > IMU_GAP_S) + 1
-    for piece in np.split(np.arange(len(t)), breaks):
-        if len(piece) < FEWEST_SAMPLES:
-            continue
-        begin, end = t[piece[0]] + reach.before - EVEN_MARGIN_S, t[piece[-1]] - reach.after
-        inside = np.flatnonzero((epochs >= begin) & (epochs <= end))
-        if len(inside) == 0:
-            continue
-        needed = piece[_needed(t[piece], epochs[inside], reach)]
-        if len(needed) >= FEWEST_SAMPLES:
-            yield needed, inside
-
-
-def _needed(t: Array, epochs: Array, reach: Reach) -> slice:
-    """The samples at ``t`` that fixes at ``epochs`` need, to either side of them."""
-    return slice(
-        int(np.searchsorted(t, epochs[0] - reach.before - EVEN_MARGIN_S)),
-        int(np.searchsorted(t, epochs[-1] + reach.ahead)),
-    )
 
 
 def _with_rates(

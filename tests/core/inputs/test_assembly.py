@@ -5,9 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from onboard.core.inputs.assembly import Assembly, AssemblySettings, mean_step
+from onboard.core.inputs.assembly import Assembly, AssemblySettings
+from onboard.core.inputs.gaps import beside_gaps, mean_step
 from onboard.core.inputs.limits import (
     ATTITUDE_MARGIN_S,
+    EVEN_MARGIN_S,
     IMU_GAP_S,
 )
 from onboard.core.inputs.parameters import ParametersInForce
@@ -171,3 +173,20 @@ def test_a_clock_that_begins_anew_makes_no_stream_fast(step, mean):
     """Telemetry at 1 Hz of a vehicle that was rebooted was told as one on the ground."""
     boots = [np.arange(begin, begin + 50.0, step) for begin in (100.0, 3.0, 40.0)]
     assert mean_step(np.concatenate(boots)) == pytest.approx(mean)
+
+
+def test_fixes_beside_gaps_are_those_that_lack_a_sample():
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 60.0, 0.02)
+    t = t[~np.any([(t > a) & (t < a + 0.6) for a in (7.3, 20.0, 20.9, 41.5)], axis=0)]
+    epochs = np.sort(rng.uniform(3.0, 57.0, 400))
+    gaps = [(a, b) for a, b in itertools.pairwise(t.tolist()) if b - a > IMU_GAP_S]
+    for reach in (NEAR, FAR):
+        lost = [
+            any(a < x + reach.after and b > x - reach.before + EVEN_MARGIN_S for a, b in gaps)
+            for x in epochs
+        ]
+        assert beside_gaps(t, epochs, reach).tolist() == lost
+        assert any(lost)
+        assert not all(lost)
+    assert not beside_gaps(t[:300], epochs, NEAR).any()  # of what comes later it is not known
