@@ -222,7 +222,9 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     """A flight examined with the force that its samples let one expect, or as it was sampled.
 
     What may be noise in the samples may be real, too: of noise there is no more than the velocity
-    walks by, and the flight is taken as its velocity is likelier.  So it is with a tone.
+    walks by, and the flight is taken as its velocity is likelier.  So it is with a tone.  Where
+    noise moves one of the six, it may be white to the end of the spectrum, or a low-pass has shaped
+    it.
     """
     sampled = asked.examined(batches)
     density = spectrum(batches)
@@ -238,9 +240,12 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2) and not sampled.found_noisy
     if little and not drowned(batches, density):
         return sampled
-    noise = shaped(density, _walk_s(sampled.noise, batches))
-    felt = asked.examined(expected(batches, density, noise), sampled)
-    return max(sampled, felt, key=lambda made: made.log_likelihood)
+    walk = _walk_s(sampled.noise, batches)
+    kinds = [np.minimum(white(density), walk)]
+    if sampled.found_noisy and np.any(walk > white(density)):
+        kinds.append(shaped(density, walk))
+    found = [asked.examined(expected(batches, density, noise), sampled) for noise in kinds]
+    return max(sampled, *found, key=lambda made: made.log_likelihood)
 
 
 def _walk_s(levels: NoiseLevels, batches: Sequence[Batch]) -> Array:
