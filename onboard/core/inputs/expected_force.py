@@ -9,14 +9,14 @@ of the force is in no sum of samples (regression calibration: Carroll et al., *M
 Nonlinear Models*, 2006, chapter 4).  Of noise with the density ``q`` in samples with the density
 ``S`` of each frequency it is the zero-phase filter ``1 - q / S`` (Wiener 1949, non-causal).
 
-``S`` is measured over the flight.  Whether any of it is noise, samples do not say: a vehicle that
-is really shaken, in turbulence or by its own motors, has a force as restless, and its receiver
-agrees with every sum of it.  Noise makes the velocity that is integrated walk, so that what the
-receiver finds of such a walk is the most that ``q`` can be at frequencies that fixes follow.
-Above them an autopilot's low-pass takes of noise and force alike, and noise is no more than ``S``
-there either: it is the lesser of the two at each frequency.  So a tone adds nothing.  Whether it is
-as much, is for the likelihood of what the receiver says to decide
-(:mod:`onboard.core.diagnosis.cleared`).
+``S`` is measured over the flight.  ``q`` is the least of it at any frequency (:func:`white`), for
+noise that is white to the end of the spectrum has no more than that, so that a tone adds nothing;
+or the lesser of ``S`` and of its own level at each frequency (:func:`shaped`), where an autopilot's
+low-pass has taken of noise and force alike.  Whether it is noise at all, samples do not say: a
+vehicle that is really shaken, in turbulence or by its own motors, has a force as restless, and its
+receiver agrees with every sum of it.  Noise makes the velocity that is integrated walk, so that
+what the receiver finds of such a walk is the most that ``q`` can be; which of them it is, is for
+the likelihood of what the receiver says to decide (:mod:`onboard.core.diagnosis.cleared`).
 
 A *tone* is the other kind: a rotor that is governed, or a motor at constant speed, beats at one
 frequency, and sampled more slowly than that it has another one, at which a vehicle may fly.  Its
