@@ -94,24 +94,6 @@ def test_an_effect_that_resembles_what_acts_does_not_stand_in_for_it(seed):
     assert chosen(mixed) == best_subset(mixed) == {"a", "d"}
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_jump_of_the_scale_that_is_none_is_not_what_others_have_seen(seed):
-    """They have seen a jump of the offset: at the force that is felt it is as large, or another."""
-    felt = np.array([0.1, -0.2, -9.8])
-    jumped, quiet = (made(np.random.default_rng(seed), *names) for names in (("b",), ()))
-    free = [*range(6), *jumped.columns("b")]
-    size = jumped.fitter().fit(free).theta[list(jumped.columns("b"))]
-    seen = Witness(1000.0, 200, 0.0, size * felt, np.full(3, 0.01))
-    for problem, said in ((jumped, True), (quiet, False)):
-        fitter = problem.fitter()
-        before, after = fitter.fit(range(6)), fitter.fit(free)
-        (scale,) = candidates(problem, "b")
-        scale = replace(scale, jump=True, witness=seen, felt=felt)
-        assert accepted(fitter, before, after, scale) is said
-        assert (scale.score(fitter, before, after) > least()) is said
-        assert (scale.margin(fitter, before, after) > CLEARLY) is said
-
-
 @pytest.mark.parametrize(("more", "said"), [(0.08, "a"), (1.0, "b")])
 @pytest.mark.parametrize("seed", range(4))
 def test_what_has_room_for_another_one_is_taken_if_what_it_adds_matters(seed, more, said):
