@@ -47,7 +47,6 @@ DISTRUST = {
     "ekf_unknown": "the autopilot has not said yet whether its state estimate is ready",
     "stale": "no fresh GPS",
     "gps_gap": "a gap in GPS",
-    "imu_gap": "gaps in the inertial samples",
     "imu_stuck": "the accelerometer repeats one reading: see to it before the next flight",
     "refused": "fixes are far from what the accelerometer says",
     "restarted": "the recording or the autopilot began anew",

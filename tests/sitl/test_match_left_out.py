@@ -4,20 +4,15 @@ The accelerometer is turned by five and four degrees, a gust front is met once, 
 telemetry of the outputs is lost.
 """
 
-import json
-import struct
-
 import pytest
-from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from onboard.cli.main import run
 from sitl import recording
 from sitl.builtin.airframe.air import Air
 from sitl.builtin.airframe.aircraft import Aircraft
 from sitl.builtin.airframe.frame import Airframe
 from sitl.builtin.effects import AccelerometerTilt
-from sitl.builtin.messages import packed
 from sitl.builtin.truth import GpsTruth
+from tests.sitl.altered import matched
 
 TURNED = {"roll": 0.08, "pitch": -0.064}
 AIR = Air(north=3.0, east=-2.0, gust_north=5.0, gust_start=45.0, gust_end=51.0)
@@ -27,7 +22,6 @@ LOST = (30.0, 36.0)
 @pytest.fixture(scope="module")
 def told(tmp_path_factory):
     """What ``onboard match --json`` says of it."""
-    folder = tmp_path_factory.mktemp("left_out")
     spec = recording.FlightSpec(
         seed=4,
         duration=90.0,
@@ -35,16 +29,11 @@ def told(tmp_path_factory):
         gps=GpsTruth(delay=0.12, stamped_early=0.02),
         effects=(AccelerometerTilt(**TURNED),),
     )
-    packer = mav.MAVLink(None, srcSystem=1, srcComponent=1)
-    log, answer = folder / "flight.tlog", folder / "answer.json"
-    with log.open("wb") as file:
-        for unix_us, message in recording.run(spec).messages:
-            t = 1e-6 * (unix_us - spec.start_unix_us)
-            if message.get_type() == "SERVO_OUTPUT_RAW" and LOST[0] < t < LOST[1]:
-                continue
-            file.write(struct.pack(">Q", unix_us) + packed(message, packer))
-    assert run(["match", str(log), "--json", str(answer)]) == 0
-    return json.loads(answer.read_text())
+
+    def without_outputs(t, message):
+        return not (message.get_type() == "SERVO_OUTPUT_RAW" and LOST[0] < t < LOST[1])
+
+    return matched(tmp_path_factory.mktemp("left_out"), spec, without_outputs)
 
 
 def test_a_tilt_of_the_accelerometer_is_none_of_the_thrust(told):
