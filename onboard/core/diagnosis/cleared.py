@@ -12,28 +12,16 @@ from onboard.core.diagnosis.coarse_readings import coarse_of
 from onboard.core.diagnosis.effort import WORTH_S
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
+from onboard.core.diagnosis.felt import Asked, felt, mean_walk_s
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import false_fixes, misled, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
-from onboard.core.filter.limits import LIMITS
-from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.shaken import walk_s
-from onboard.core.inputs.expected_force import (
-    drowned,
-    expected,
-    shaped,
-    spectrum,
-    swung,
-    tones,
-    white,
-)
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
-from onboard.core.maths.arrays import Array
 from onboard.core.model.regressors import Family
 from onboard.core.physics.catalogue import catalogue
 from onboard.core.physics.effect import Effect, Origin
@@ -102,8 +90,8 @@ def cleared(
         testable = [f for f in testable if not bent[f.effect]]
     coarse = coarse_of(batches, calibrator.parameters.six(origin.imu))
     carried: tuple[Family, ...] = () if coarse is None else (coarse.conversion,)
-    asked = _Asked(engine, testable, origin.t0, carried, beside)
-    full = _felt(asked, batches)
+    asked = Asked(engine, testable, origin.t0, carried, beside)
+    full = felt(asked, batches)
     spikes: Finding | None = None
     if rail is None:
         full, batches, spikes = _without_spikes(asked, batches, full)
@@ -140,13 +128,13 @@ def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch] | N
 
 
 def _without_spikes(
-    asked: _Asked, batches: Sequence[Batch], full: Examination
+    asked: Asked, batches: Sequence[Batch], full: Examination
 ) -> tuple[Examination, Sequence[Batch], Finding | None]:
     """The flight without samples that its velocities know nothing of, or as it is."""
     spiked = spikes_of(batches)
     if spiked is None or not _matter(spiked, batches, full, asked.engine):
         return full, batches, None
-    without = _felt(asked, spiked.batches)
+    without = felt(asked, spiked.batches)
     better = 2.0 * (without.log_likelihood - full.log_likelihood)
     if better <= CLEARLY:
         return full, batches, None
@@ -159,7 +147,7 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
     That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
     that smooths: a span or an antenna may have been found for the sake of these very samples.
     """
-    if spikes.walk**2 < WALK_SHARE * np.max(_walk_s(full.noise, spikes.batches)):
+    if spikes.walk**2 < WALK_SHARE * np.max(mean_walk_s(full.noise, spikes.batches)):
         return False
     plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
     told = []
@@ -171,87 +159,6 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
         made.once()
         told.append(made.log_likelihood)
     return 2.0 * (told[0] - told[1]) > CLEARLY
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """Of a flight: whose sensor's, with which effects from when on, what else there is."""
-
-    engine: Engine
-    testable: Sequence[Effect]
-    t0: float
-    carried: Sequence[Family]
-    beside: Examination | None
-
-    def examined(self, batches: Sequence[Batch], start: Examination | None = None) -> Examination:
-        """The flight with its own noise and timing, which are looked for from those of ``start``.
-
-        Else from those of the accelerometer beside it: it has flown the same flight with the same
-        receiver, and a search takes a third of the passes from there.  Else from where they are
-        likeliest with nothing but scale, offset and timing: with every effect at once, a search
-        that knows nothing yet is led away by what effects make up for, and does not come back.  A
-        heading that seemed worse than usual may have been one of them, though.
-        """
-        plain = self.plain(batches) if start is None and self.beside is None else None
-        start = start or plain
-        made = Examination(
-            self.engine,
-            self.testable,
-            t0=self.t0,
-            batches=batches,
-            start=start,
-            carried=self.carried,
-        )
-        if plain is not None and plain.noise != (usual := plain.noise.with_usual_heading):
-            made.noise = usual
-            made.with_rows()  # what it is linear about would pass for noise
-        if start is None and self.beside is not None:
-            made.begin_as(self.beside)
-        return made.with_noise()
-
-    def plain(self, batches: Sequence[Batch]) -> Examination:
-        """The flight without any effect, noise and timing at their likeliest; no sums."""
-        made = Examination(
-            self.engine, (), t0=self.t0, batches=batches, carried=self.carried, traced=False
-        )
-        made.tune()
-        return made
-
-
-def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
-    """A flight examined with the force that its samples let one expect, or as it was sampled.
-
-    What may be noise in the samples may be real, too: of noise there is no more than the velocity
-    walks by, and the flight is taken as its velocity is likelier.  So it is with a tone.  Where
-    noise moves one of the six, it may be white to the end of the spectrum, or a low-pass has shaped
-    it.
-    """
-    sampled = asked.examined(batches)
-    density = spectrum(batches)
-    if density is None:
-        return sampled
-    tone, fixes = tones(density), sum(len(b.fixes) for b in batches)
-    # Of what not even the best receiver could tell, nothing is asked.
-    if fixes * np.sum((swung(batches, tone) / LIMITS["velocity"][0]) ** 2) > CLEARLY:
-        toneless = asked.examined(expected(batches, density, tone), sampled)
-        if toneless.log_likelihood > sampled.log_likelihood:
-            sampled, batches = toneless, toneless.batches
-            density = np.maximum(density - tone, np.min(density, axis=0))
-    little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2) and not sampled.found_noisy
-    if little and not drowned(batches, density):
-        return sampled
-    walk = _walk_s(sampled.noise, batches)
-    kinds = [np.minimum(white(density), walk)]
-    if sampled.found_noisy and np.any(walk > white(density)):
-        kinds.append(shaped(density, walk))
-    found = [asked.examined(expected(batches, density, noise), sampled) for noise in kinds]
-    return max(sampled, *found, key=lambda made: made.log_likelihood)
-
-
-def _walk_s(levels: NoiseLevels, batches: Sequence[Batch]) -> Array:
-    """(3,) variance by which the velocity walks in a second of all batches, (m/s)^2."""
-    out: Array = np.mean([walk_s(levels, batch.segment) for batch in batches], axis=0)
-    return out
 
 
 def since_reboot(batches: Sequence[Batch], since: float = -np.inf) -> list[Batch]:

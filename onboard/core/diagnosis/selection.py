@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from onboard.core.estimate.limits import FEWEST_BLOCKS, FOLDS
 from onboard.core.estimate.pool import Pool
 from onboard.core.estimate.scatter import Scatter, Stacked
+from onboard.core.estimate.solution import without
 from onboard.core.estimate.weighing import Weighing, directions_of
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, total
@@ -75,6 +76,7 @@ class Fitter:
         folds = np.array_split(np.arange(len(self.blocks)), min(FOLDS, len(self.blocks)))
         self._members = [fold for fold in folds if len(fold) > 0]
         self._folds = [total([self.blocks[i] for i in fold]) for fold in self._members]
+        self._unseen = [without(self.sums, fold, model) for fold in self._folds]
 
     @property
     def rows(self) -> float:
@@ -91,9 +93,8 @@ class Fitter:
         chi2 = self._penalised(self.sums, theta, free)
         out = 0.0 if held_out else float("nan")
         if held_out and len(self._folds) > 1:
-            for fold in self._folds:
-                other = self._solve(self.sums - fold, free, at)
-                out += fold.residual(other)
+            for fold, rest in zip(self._folds, self._unseen, strict=True):
+                out += fold.residual(self._solve(rest, free, at))
         return Fit(theta, tuple(free), chi2, out)
 
     def held_fits(
@@ -101,8 +102,8 @@ class Fitter:
     ) -> list[tuple[NDArray[np.intp], Array]]:
         """Blocks of each fold, and the unknowns (m,) of a fit that has not seen them."""
         at = (self.absent if held is None else held).copy()
-        pairs = zip(self._members, self._folds, strict=True) if len(self._folds) > 1 else ()
-        return [(members, self._solve(self.sums - fold, free, at)) for members, fold in pairs]
+        pairs = zip(self._members, self._unseen, strict=True) if len(self._folds) > 1 else ()
+        return [(members, self._solve(rest, free, at)) for members, rest in pairs]
 
     def _solve(self, sums: NormalSums, free: Sequence[int], at: Array) -> Array:
         index = list(free)

@@ -117,6 +117,20 @@ def solve(blocks: Sequence[Block], model: Model) -> Solution:
     )
 
 
+def without(sums: NormalSums, part: NormalSums, model: Model) -> NormalSums:
+    """Sums of a flight less those of a part of it, with something left in every direction.
+
+    Args:
+        sums: of the flight.
+        part: of it.
+        model: of the sums, with its prior.
+    """
+    rest = sums - part
+    # Noise that leaves enough of all of a flight may leave nothing of four fifths of it.
+    rest.G *= share_of_gram(rest, np.diag(model.prior_sigma**-2.0))
+    return rest
+
+
 def limited(blocks: list[Block], model: Model) -> list[Block]:
     """Blocks whose noise in the regressors leaves something in every direction of the flight."""
     if not blocks:
@@ -188,7 +202,7 @@ def held_out(blocks: Sequence[Block], model: Model, fixed: dict[int, float] | No
     square, rows = 0.0, 0.0
     for fold in np.array_split(np.arange(len(blocks)), min(FOLDS, len(blocks))):
         out = total([blocks[i] for i in fold])
-        rest = everything - out
+        rest = without(everything, out, model)
         theta = held.copy()
         A = (rest.signal + prior)[np.ix_(free, free)]
         c = rest.b + prior @ model.prior - (rest.N @ held)

@@ -11,12 +11,13 @@ Nonlinear Models*, 2006, chapter 4).  Of noise with the density ``q`` in samples
 
 ``S`` is measured over the flight.  ``q`` is the least of it at any frequency (:func:`white`), for
 noise that is white to the end of the spectrum has no more than that, so that a tone adds nothing;
-or the lesser of ``S`` and of its own level at each frequency (:func:`shaped`), where an autopilot's
-low-pass has taken of noise and force alike.  Whether it is noise at all, samples do not say: a
-vehicle that is really shaken, in turbulence or by its own motors, has a force as restless, and its
-receiver agrees with every sum of it.  Noise makes the velocity that is integrated walk, so that
-what the receiver finds of such a walk is the most that ``q`` can be; which of them it is, is for
-the likelihood of what the receiver says to decide (:mod:`onboard.core.diagnosis.cleared`).
+or the lesser of ``S`` and of its own level at each frequency (:func:`levelled`), where an
+autopilot's low-pass has taken of noise and force alike.  Whether it is noise at all, samples do not
+say: a vehicle that is really shaken, in turbulence or by its own motors, has a force as restless,
+and its receiver agrees with every sum of it.  Noise makes the velocity that is integrated walk, so
+that what the receiver finds of such a walk is what ``q`` is, but for what an average and a delay
+that are fitted make of it.  Which of them it is, and how much, is for the likelihood of what the
+receiver says to decide (:mod:`onboard.core.diagnosis.felt`).
 
 A *tone* is the other kind: a rotor that is governed, or a motor at constant speed, beats at one
 frequency, and sampled more slowly than that it has another one, at which a vehicle may fly.  Its
@@ -28,6 +29,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,6 +45,9 @@ from onboard.core.inputs.limits import (
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
+
+TAKEN = "noise_taken"
+"""The slow signal of what more noise would take off the samples."""
 
 
 def spectrum(batches: Sequence[Batch]) -> Array | None:
@@ -63,17 +68,6 @@ def spectrum(batches: Sequence[Batch]) -> Array | None:
 def white(density: Array) -> Array:
     """(3,) density that white noise may have at the most, of a spectrum (bins, 3)."""
     out: Array = _averaged(density, FLOOR_BINS).min(axis=0)
-    return out
-
-
-def shaped(density: Array, walk: Array) -> Array:
-    """(bins, 3) density of white noise that a low-pass has shaped, at the most.
-
-    Args:
-        density: (bins, 3) of the samples.
-        walk: (3,) variance by which the velocity is found to walk in a second, (m/s)^2.
-    """
-    out: Array = np.minimum(_averaged(density, SPECTRUM_BINS), walk)
     return out
 
 
@@ -133,6 +127,31 @@ def expected(batches: Sequence[Batch], density: Array, noise: Array) -> list[Bat
     return with_samples(batches, lambda _, raw: _filtered(raw, gain))
 
 
+def levelled(batches: Sequence[Batch], density: Array, level: Array) -> list[Batch]:
+    """The same of white noise that a low-pass has shaped, and what more of it would take.
+
+    Args:
+        batches: the flight.
+        density: (bins, 3) of its samples.
+        level: (3,) density of the noise where no low-pass takes of it.
+
+    Returns:
+        The flight; its segments have what a level e times as high would take off their samples, to
+        first order, as a slow signal :data:`TAKEN`, m/s^2, sensor axes.
+    """
+    there = _averaged(density, SPECTRUM_BINS)
+    # Where nothing is left, more noise takes nothing more.
+    more = np.divide(level, there, out=np.zeros_like(there), where=level < there)
+    more[0] = 0.0  # of the mean
+    out, made = expected(batches, density, np.minimum(there, level)), {}
+    for run, felt in zip(runs(batches), runs(out), strict=True):
+        t, raw = joined(run)
+        taken = _filtered(raw - raw.mean(axis=0), more)
+        for s in (batch.segment for batch in felt):
+            made[id(s)] = s.with_slow(s.slow | {TAKEN: (t, taken)})
+    return [replace(b, segment=made[id(b.segment)]) for b in out]
+
+
 def _periodograms(raw: Array, step: float) -> Iterator[Array]:
     """Two-sided densities (bins, 3), (m/s^2)^2 s, of stretches that overlap by half (Welch)."""
     n = 2 * round(RESOLVED_S / step / 2.0)
@@ -144,7 +163,9 @@ def _periodograms(raw: Array, step: float) -> Iterator[Array]:
 
 def _gain(density: Array, noise: Array) -> Array:
     """(bins, 3) of the filter."""
-    gain: Array = np.clip(1.0 - noise / _averaged(density, SPECTRUM_BINS), 0.0, 1.0)
+    there = _averaged(density, SPECTRUM_BINS)
+    share = np.divide(noise, there, out=np.zeros_like(there), where=there > 0.0)
+    gain: Array = np.clip(1.0 - share, 0.0, 1.0)
     gain[0] = 1.0  # of the mean
     return gain
 

@@ -8,14 +8,16 @@ import pytest
 from onboard.core.diagnosis.cleared import cleared
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.filter.shaken import walk_s
-from onboard.core.inputs.expected_force import expected
+from onboard.core.inputs import expected_force
+from onboard.core.inputs.joined import with_samples as without
 from onboard.core.inputs.samples import AttitudeSample, GpsFix, ImuSample
 from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.model.noise_level import DOUBT, NoiseLevel
 from onboard.core.physics.effect import Origin
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, fly_messages
-from tests.core.estimate.test_simulated_flights import fed, flown
+from tests.core.estimate.test_simulated_flights import TRUE, fed, flown
 
 STEP, LATE = 0.02, 0.12
 """s between samples, s that the receiver is late by."""
@@ -68,6 +70,13 @@ def changed_and_walk(samples):
     taken = [a.segment.raw_s - b.segment.raw_s for a, b in zip(full.batches, sampled, strict=True)]
     walk = np.mean([walk_s(full.noise, batch.segment) for batch in sampled], axis=0)
     return np.sqrt(np.mean(np.concatenate(taken) ** 2, axis=0)), walk
+
+
+def examined(samples):
+    """The flight as it is taken, and the accelerometer that it is of."""
+    made = fed(samples, Calibrator())
+    clear = cleared(made, made.engine(1), made.engine(1).batches, Origin(made.first_sample))
+    return clear.full
 
 
 @pytest.fixture(scope="module")
@@ -128,9 +137,9 @@ def test_noise_that_no_velocity_shows_is_asked_about_in_a_hover(flight, monkeypa
 
     def expecting(*given):
         asked.append(given)
-        return expected(*given)
+        return without(*given)
 
-    monkeypatch.setattr("onboard.core.diagnosis.cleared.expected", expecting)
+    monkeypatch.setattr(expected_force, "with_samples", expecting)
     spec = FlightSpec(vehicle="copter", seed=6, duration=200.0, imus=random_imus(6), dull=True)
     decoder = Decoder()
     hover = [s for _, message in fly_messages(spec) for s in decoder.decode(message)]
@@ -140,3 +149,17 @@ def test_noise_that_no_velocity_shows_is_asked_about_in_a_hover(flight, monkeypa
     asked.clear()
     changed(shaken(flight, noise=little))
     assert not asked
+
+
+@pytest.mark.slow
+def test_levels_of_noise_are_found_beside_the_scales_with_what_is_open_of_both(flight):
+    """Where noise drowns the force of an axis, its walk is what an average has left of it."""
+    sigma = np.array([1.5, 0.6, 0.9])
+    full = examined(shaken(flight, noise=sigma))
+    (level,) = [f for f in full.carried if isinstance(f, NoiseLevel)]
+    found, at = full.found(), full.model.slices[NoiseLevel.name]
+    off = np.log(level.about / (sigma**2 * STEP)) + found.theta[at]
+    assert np.all(np.abs(off) < 3.0 * np.sqrt(np.diag(found.covariance)[at]))
+    assert np.all(np.abs(off) < DOUBT), "an octave is what is known before"
+    scale, sigma = found.theta[:3], np.sqrt(np.diag(found.covariance)[:3])
+    assert np.all(np.abs(scale - TRUE.scale) < 3.0 * sigma)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from onboard.core.inputs.expected_force import (
+    TAKEN,
     drowned,
     expected,
-    shaped,
+    levelled,
     spectrum,
     swung,
     tones,
@@ -92,14 +93,32 @@ def test_noise_that_a_low_pass_has_shaped_goes_by_what_the_velocity_walks():
     density, walk = spectrum(flight), np.full(3, sigma**2 * STEP)
     assert np.all(white(density) < 0.05 * walk)
     left, before = (
-        (felt(expected(flight, density, q)) - f).std(axis=0)
-        for q in (shaped(density, walk), white(density))
+        (felt(made) - f).std(axis=0)
+        for made in (levelled(flight, density, walk), expected(flight, density, white(density)))
     )
     assert np.all(left < 0.6 * before)
     assert np.all(before > 0.9 * noise.std(axis=0))
     # No more is taken than the velocity walks by.
-    little = expected(flight, density, shaped(density, 0.01 * walk))
+    little = levelled(flight, density, 0.01 * walk)
     assert np.all((felt(little) - f - noise).var(axis=0) < 0.01 * walk / STEP)
+
+
+def test_what_more_noise_would_take_is_the_derivative_of_what_is_expected():
+    flight = batches(manoeuvre() + 0.3 * np.random.default_rng(5).normal(size=(len(T), 3)))
+    density, little = spectrum(flight), 1e-4
+    level = white(density) * [0.3, 0.6, 0.9]  # below the least of it: no frequency is all noise
+    at, above, below = (
+        levelled(flight, density, level * by) for by in (1.0, np.exp(little), np.exp(-little))
+    )
+    slope = (felt(above) - felt(below)) / (2.0 * little)
+    for b in at:
+        t, taken = b.segment.slow[TAKEN]
+        here = np.round(t / STEP).astype(int)
+        assert taken == pytest.approx(-slope[here], rel=1e-3, abs=1e-5)
+    # Of no noise at all more is none, and where nothing is left more takes nothing.
+    for nothing in (np.zeros(3), 1.1 * density.max(axis=0)):
+        for b in levelled(flight, density, nothing):
+            assert np.abs(b.segment.slow[TAKEN][1]).max() < 1e-9
 
 
 def slowed(x, pole):
