@@ -120,6 +120,7 @@ class Learner:
         if before != there and not same:
             if before is not None:
                 self._shelve(before)
+                self._tell_of_another(before, there)
             loaded = self._take_from_shelf(calibrator)
             kept = kept or loaded
         self._kept = Kept(calibrator.sums)
@@ -134,6 +135,15 @@ class Learner:
         for event in self._calibrator.restart("reboot") if rebooted else ():
             self._note(event)
         self._before_gap = meanings(self._calibrator.parameters.values)
+
+    def _tell_of_another(self, before: Identity, there: Identity) -> None:
+        """Nothing that was shown a moment ago is of this one: that is not to look like a fault."""
+        if there.surely_not(before):
+            text = (
+                f"another board answers as system {there.system_id}: what was learned of the one "
+                "before is kept for that one, a flight that it has not ended is not"
+            )
+            self._tell("another_board", text, warning=True)
 
     def _take_from_shelf(self, calibrator: Calibrator) -> JudgedFlight | None:
         """Lay what is on the disk beside this calibrator; the last flight that was judged."""
