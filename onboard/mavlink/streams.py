@@ -92,6 +92,8 @@ class Streams:
         self._body_rate = 0.0 if reported is None else reported.request.rate
         self._views = Views()
         self.legacy = False
+        self.obeyed_at = -math.inf
+        """When it last said yes or no to a question, s: it hears us, and is heard."""
         self._target: tuple[int, int] | None = None
         self._current: Stream | None = None
         self._rung = 0
@@ -200,6 +202,7 @@ class Streams:
             self._streams[number].restart(now)
 
     def _answer(self, stream: Stream, result: int, now: float) -> None:
+        self.obeyed_at = now
         if result == mavlink.MAV_RESULT_IN_PROGRESS:
             self._asked_at = now
             return

@@ -93,6 +93,8 @@ class Vigilance:
             yield "unsigned_vehicle", text
         if text := self._hindrance.mute(now):
             yield "unanswered", text
+        elif text := self._hindrance.untold(now):
+            yield "untold", text
         elif text := self._hindrance.seldom(now):
             yield "seldom", text
 
