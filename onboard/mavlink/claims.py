@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from onboard.core.inputs.boot_time import LONGEST_DELAY_S
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import Message
 from onboard.mavlink.peers import Address
@@ -92,7 +93,7 @@ class Claim:
         mine, theirs = self.boot_expected(now), vehicle.boot_expected(now)
         if mine is None or theirs is None or now - vehicle.boot_at > limits.CLOCK_AGREES_S:
             return
-        if abs(mine - theirs) <= limits.CLOCKS_APART_S:
+        if abs(mine - theirs) <= LONGEST_DELAY_S:
             self.apart_since, self.apart_for = None, 0.0
             return
         self.apart_since = now if self.apart_since is None else self.apart_since
@@ -102,8 +103,8 @@ class Claim:
     def is_another(self) -> bool:
         """Whether it is another vehicle, whatever it calls itself.
 
-        One vehicle has one boot clock.  Here two have gone on beside each other, further apart and
-        for longer than a link delays and a reboot lasts.
+        One vehicle has one boot clock.  Here two have gone on beside each other, further apart than
+        a link delays, and for longer than a reboot lasts.
         """
         return self.apart_for > limits.CLOCKS_APART_S
 

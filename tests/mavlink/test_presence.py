@@ -300,18 +300,19 @@ def test_in_a_push_and_where_an_id_is_configured_nothing_is_followed():
         assert wire.presence.source == VEHICLE
 
 
+@pytest.mark.parametrize("apart", [1.2 * LONGEST_DELAY_S, -1.2 * LONGEST_DELAY_S, 300.0])
 @pytest.mark.parametrize(("committed", "way"), [(True, HERE), (False, THERE)])
 def test_another_vehicle_under_its_name_does_not_take_the_place_of_one_that_was_learned(
-    committed, way
+    committed, way, apart
 ):
     """Both were heard, with clocks of their own: what is silent is not what still speaks."""
     wire = Wire(committed=committed)
     for _ in range(30):
         wire.second(HERE)
         wire.now -= 1.0
-        wire.second(THERE, offset=400.0)
+        wire.second(THERE, offset=100.0 + apart)
     for _ in range(30):
-        wire.second(THERE, offset=400.0)
+        wire.second(THERE, offset=100.0 + apart)
     assert wire.presence.way == way
     assert wire.presence.namesake(wire.now) is committed
     for _ in range(3):
@@ -337,9 +338,9 @@ def test_a_way_that_is_late_is_no_other_vehicle():
     for _ in range(30):
         wire.second(HERE)
         wire.now -= 1.0
-        wire.second(OTHER_ENDPOINT, offset=100.0 - LONGEST_DELAY_S)
+        wire.second(OTHER_ENDPOINT, offset=100.0 - 0.9 * LONGEST_DELAY_S)
     assert not wire.presence.namesake(wire.now)
     wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
     for _ in range(3):
-        wire.second(OTHER_ENDPOINT, offset=100.0 - LONGEST_DELAY_S)
+        wire.second(OTHER_ENDPOINT, offset=100.0 - 0.9 * LONGEST_DELAY_S)
     assert wire.presence.way == OTHER_ENDPOINT
