@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from onboard.core.inputs.boot_time import LONGEST_DELAY_S
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import Message
 from onboard.mavlink.peers import Address
@@ -38,6 +39,8 @@ class Claim:
     boot_at: float = 0.0
     first_boot: float = 0.0
     first_at: float = 0.0
+    apart_since: float | None = None
+    apart_for: float = 0.0
 
     @property
     def proven(self) -> bool:
@@ -57,6 +60,7 @@ class Claim:
             self.stamps += 1
         elif boot < self.boot - limits.CLOCK_AGREES_S:
             self.stamps, self.first_boot, self.first_at = 1, boot, now  # it began anew
+            self.apart_since, self.apart_for = None, 0.0
         else:
             return
         self.boot, self.boot_at = boot, now
@@ -83,6 +87,26 @@ class Claim:
         another = same_place and self.source != other.source and self.proven
         begins = other.heard - self.first_at <= limits.CLOCK_AGREES_S
         return another and begins and self._has_the_clock_of(other, now)
+
+    def note_beside(self, vehicle: Claim, now: float) -> None:
+        """It has just told its boot time, and so has, a moment ago, the vehicle of that name."""
+        mine, theirs = self.boot_expected(now), vehicle.boot_expected(now)
+        if mine is None or theirs is None or now - vehicle.boot_at > limits.CLOCK_AGREES_S:
+            return
+        if abs(mine - theirs) <= LONGEST_DELAY_S:
+            self.apart_since, self.apart_for = None, 0.0
+            return
+        self.apart_since = now if self.apart_since is None else self.apart_since
+        self.apart_for = now - self.apart_since
+
+    @property
+    def is_another(self) -> bool:
+        """Whether it is another vehicle, whatever it calls itself.
+
+        One vehicle has one boot clock.  Here two have gone on beside each other, further apart than
+        a link delays, and for longer than a reboot lasts.
+        """
+        return self.apart_for > limits.CLOCKS_APART_S
 
     def _has_the_clock_of(self, other: Claim, now: float) -> bool:
         mine, theirs = self.boot_expected(now), other.boot_expected(now)

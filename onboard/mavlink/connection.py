@@ -230,7 +230,9 @@ class Connection:
         """Tell it, if it is news."""
         now = self._clock()
         if self.is_up:
-            news = self.outage.lost(reason, now)
+            # A line that says nothing is given up late: it was lost when the last byte had come.
+            last = self.last_received if self._is_stream else None
+            news = self.outage.lost(reason, now if last is None else last)
         else:
             self.failures += 1
             news = self.outage.failed(reason, now)

@@ -47,6 +47,8 @@ class Stream:
         self.number = MESSAGE_IDS[request.name]
         wanted = request.interval_ms
         self.ladder = (wanted, *(step for step in limits.LADDER_MS if step > wanted))
+        self.unwanted = False
+        """Whether nothing is to be had from it: what it carries is not there."""
         self.restart(0.0)
 
     def restart(self, now: float) -> None:
@@ -56,6 +58,8 @@ class Stream:
         self.granted: int | None = None
         self.due: float | None = now
         self.measured: float | None = None
+        if self.unwanted:
+            self.rest()
         self.again = 0
         self.rechecked = False
         self._since = now
@@ -94,7 +98,7 @@ class Stream:
             return
         self.measured = self._count / elapsed
         self._begin_window(now)
-        if self.granted is None or self.state is StreamState.ASKED:
+        if self.granted is None or self.state is StreamState.ASKED or self.unwanted:
             return
         if self.measured >= limits.RATE_SHORTFALL * expected:
             self.state, self.again, self.due = StreamState.FLOWING, 0, None
@@ -107,6 +111,23 @@ class Stream:
         self.due = None
         self.state = StreamState.GRANTED
         self._begin_window(now)
+
+    def rest(self) -> None:
+        """It is not asked for any more."""
+        self.state = StreamState.UNSUPPORTED
+        self.due = self.granted = None
+
+    def want(self, now: float, *, wanted: bool) -> None:
+        """Whether what it carries is there; where it was asked for in vain, that is taken back."""
+        if wanted is not self.unwanted:
+            return
+        self.unwanted = not wanted
+        if wanted:
+            self.restart(now)
+        elif self.granted is not None:
+            self.due = now
+        elif self.state is not StreamState.ASKED:
+            self.rest()
 
     def give_up(self, now: float) -> None:
         """Even the slowest interval was denied: there is no such message, unless we misheard."""

@@ -13,6 +13,9 @@ handed on.  The pin moves in five cases, and never while it is held (a push is u
 * it has been silent for as long as counts as lost, and another way claims to be it: that is told
   as a vehicle that is back, which is asked anew which board it is;
 * it is lost, nothing was learned of it, and another vehicle is there.
+
+Another vehicle is one with another id, or one of which the boot clock has gone on beside that of
+this one: several that fly with the id they were sold with, and come by one port.
 """
 
 from __future__ import annotations
@@ -117,6 +120,17 @@ class Presence:
             for claim in self._claims
         )
 
+    def namesake(self, now: float) -> bool:
+        """Whether another vehicle was heard under this one's name these seconds."""
+        pinned = self._pinned
+        return pinned is not None and any(
+            claim is not pinned
+            and claim.source == pinned.source
+            and claim.is_another
+            and now - claim.heard <= limits.TWIN_S
+            for claim in self._claims
+        )
+
     def others(self, now: float) -> tuple[int, ...]:
         """System ids of other autopilots that were heard these seconds."""
         pinned = self._pinned
@@ -181,6 +195,8 @@ class Presence:
         if source != pinned.source:
             self.foreign += claim is not None
             return _OF_SOMEBODY
+        if claim is not None and claim.boot_at == now:
+            claim.note_beside(pinned, now)
         other = way[0] != pinned.way[0]
         self.standby += other
         self.foreign += not other
@@ -196,7 +212,7 @@ class Presence:
         if claim.is_renamed(pinned, now):
             return beats and now - pinned.heard > limits.FAILOVER_S
         lost = self.state is AutopilotState.SILENT
-        same = claim.source == pinned.source
+        same = claim.source == pinned.source and not claim.is_another
         if same and claim.proven and (lost or not pinned.proven):
             return beats
         if same and lost:  # perhaps it was not asked for anything yet, or somebody only beats

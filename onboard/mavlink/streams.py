@@ -12,8 +12,10 @@ too.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 from onboard.core.inputs.views import Views
 from onboard.mavlink import limits
@@ -24,6 +26,11 @@ from onboard.mavlink.parameter_messages import number_meant
 __all__ = ["DEFAULT_STREAMS", "StreamRequest", "StreamState", "StreamStatus", "Streams"]
 
 BODY_ATTITUDE = "ATTITUDE_QUATERNION"
+CARRIERS: Final[Mapping[str, str]] = MappingProxyType(
+    {"INS_ACC2_ID": "SCALED_IMU2", "INS_ACC3_ID": "SCALED_IMU3"}
+)
+"""Parameters that are zero where an accelerometer is not there, and the message that would carry
+it: ArduPilot sends that for the sake of a compass, a sixth of what an ordinary line carries."""
 
 LEGACY_GROUPS: dict[str, int] = {
     "RAW_IMU": 1,
@@ -92,12 +99,14 @@ class Streams:
         self._body_rate = 0.0 if reported is None else reported.request.rate
         self._views = Views()
         self.legacy = False
+        self.obeyed_at = -math.inf
+        """When it last said yes or no to a question, s: it hears us, and is heard."""
         self._target: tuple[int, int] | None = None
         self._current: Stream | None = None
         self._rung = 0
         self._asked_at = 0.0
         self._asks = 0
-        self._answered = False
+        self._answered = self._takes_back = False
         self._mute = 0
         self._too_fast = 0
         self._quiet_until = 0.0
@@ -114,6 +123,8 @@ class Streams:
         if self._target != (system, component):
             self._views.forget()
             self._follow_views(now)
+            for stream in self._streams.values():
+                stream.unwanted = False
         self._target = (system, component)
         self.legacy = False
         self._current = None
@@ -142,6 +153,11 @@ class Streams:
             value = number_meant(float(message.param_value), message.param_type)
             if self._views.take(message.param_id, value):
                 self._follow_views(now)
+            carrier = self._streams.get(MESSAGE_IDS.get(CARRIERS.get(message.param_id, ""), -1))
+            if carrier is not None:
+                carrier.want(now, wanted=value != 0.0)
+                if carrier.unwanted and self.legacy:  # groups are asked for as a whole
+                    carrier.rest()
             return ()
         if (
             message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_ACK
@@ -200,6 +216,7 @@ class Streams:
             self._streams[number].restart(now)
 
     def _answer(self, stream: Stream, result: int, now: float) -> None:
+        self.obeyed_at = now
         if result == mavlink.MAV_RESULT_IN_PROGRESS:
             self._asked_at = now
             return
@@ -209,6 +226,11 @@ class Streams:
             self._quiet_until = now + limits.ACK_TIMEOUT_S
         if result == mavlink.MAV_RESULT_UNSUPPORTED and not self._answered:
             self._go_legacy(now)
+        elif stream.unwanted and (self._takes_back or result != mavlink.MAV_RESULT_ACCEPTED):
+            stream.rest()
+        elif stream.unwanted:  # what was asked for before that was known is taken back next
+            stream.settle(now, self._rung)
+            stream.due = now
         elif result == mavlink.MAV_RESULT_ACCEPTED:
             self._answered = True
             stream.settle(now, self._rung)
@@ -252,12 +274,13 @@ class Streams:
             return ()
         stream.state = StreamState.ASKED
         self._asked_at = now
+        self._takes_back = stream.unwanted  # 0: as often as by itself
         message = mavlink.MAVLink_command_long_message(
             *self._target,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
             self._asks,
             float(stream.number),
-            1e3 * stream.ladder[self._rung],
+            0.0 if self._takes_back else 1e3 * stream.ladder[self._rung],
             0.0,
             0.0,
             0.0,

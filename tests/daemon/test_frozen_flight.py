@@ -164,6 +164,32 @@ def test_ten_seconds_of_arming_after_a_restart_lose_no_proposal(flight, tmp_path
 
 
 @pytest.mark.slow
+def test_a_flight_that_the_power_went_before_is_said_to_be_lost(flight, tmp_path, believed):
+    """Saved in the air, after the landing, and when it has been judged."""
+    lost = []
+    one = learner(tmp_path)
+    aloft, rest = until_disarmed(flight)
+
+    def after_a_start():
+        one.save(1e9)
+        told = learner(tmp_path).learn((), judging=()).news
+        return [news.text for news in told if news.kind == "flight_lost"]
+
+    assert after_a_start() == []
+    one.learn(aloft, judging=())
+    lost += after_a_start()
+    one.learn(rest, judging=())
+    lost += after_a_start()
+    one.examine()
+    assert after_a_start(), "one of two is not yet all of it"
+    flown = one.examine().trust.trusted_s
+    assert after_a_start() == []
+    told = [float(text.split(" s of flight")[0]) for text in lost]
+    assert told[0] <= told[1] == round(flown)
+    assert told[0] > 30.0
+
+
+@pytest.mark.slow
 def test_other_values_in_force_on_the_same_board_lay_the_sums_aside(flight, tmp_path, believed):
     one = learner(tmp_path)
     one.learn(flight, judging=())

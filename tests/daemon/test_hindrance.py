@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from onboard.daemon.process import limits
 from onboard.daemon.pushing.parameters import NEEDED, ParameterWatch
 from onboard.errors import LinkError
-from tests.daemon.daemons import until
+from tests.daemon.daemons import SIX, until
 from tests.daemon.standing_vehicle import Vehicle
 from tests.daemon.test_parameter_watch import told
 
@@ -67,6 +67,40 @@ async def test_an_autopilot_that_answers_nothing_is_told_of(document, daemon, po
         vehicle.deaf = False
         await until(lambda: not service.snapshot().link.warnings)
         assert kinds(service).count("unanswered") == 1
+
+
+class Full(Sparing):
+    """A slow line: it obeys, but what it is asked for has no room beside its samples."""
+
+    full = True
+    untold = ()
+
+    def _tell(self, name):
+        if not self.full and name not in self.untold:
+            super()._tell(name)
+
+
+@virtual_time
+async def test_a_line_that_has_no_room_for_parameters_is_not_called_cut(document, daemon, port):
+    async with daemon(document) as service, Full(port, rate=8.0) as vehicle:
+        await until(lambda: "unanswered" in kinds(service))
+        (warning,) = service.snapshot().link.warnings
+        assert "parameters are asked for in vain" in warning
+        vehicle.full = False
+        await until(lambda: not service.snapshot().link.warnings)
+
+
+@virtual_time
+async def test_what_it_does_not_tell_is_said_while_others_are_answered(document, daemon, port):
+    async with daemon(document) as service, Full(port, rate=8.0) as vehicle:
+        vehicle.full, vehicle.untold = False, SIX[:3]
+        await until(lambda: "untold" in kinds(service))
+        (warning,) = service.snapshot().link.warnings
+        assert warning.startswith(f"the autopilot does not tell {SIX[0]} and 2 more")
+        assert service.snapshot().next_step.text == warning
+        vehicle.untold = ()
+        await until(lambda: not service.snapshot().link.warnings)
+        assert kinds(service).count("untold") == 1
 
 
 @virtual_time

@@ -132,3 +132,27 @@ async def test_values_that_change_are_asked_for_at_a_pace(document, daemon, port
             await asyncio.sleep(60.0)
             asked = vehicle.heard.count("PARAM_REQUEST_READ") - asked
             assert asked < 8 * len(NEEDED), "each every ten seconds, and all every thirty"
+
+
+async def test_what_was_learned_of_a_silent_one_is_not_given_up_for_another_of_its_name(
+    document, daemon, port
+):
+    """From an address of its own, with a clock of its own: beside it, and while it is silent."""
+    async with daemon(document) as service, Vehicle(port) as vehicle, Vehicle(port) as other:
+        other.board, other.boot_ms = OTHER, vehicle.boot_ms + 3e5
+        await until(lambda: service.link.presence.proven)
+        way = service.link.presence.way
+        await push_done(service, vehicle)
+        await asyncio.sleep(15.0)
+        vehicle.stop_talking()
+        await asyncio.sleep(30.0)
+        assert service.link.presence.way == way
+        (text,) = notices(service, "another_speaks")
+        assert "another one, by its clock, speaks as system 1, too" in text
+        assert text in service.snapshot().link.warnings
+        vehicle.talk_again()
+        await until(lambda: service.snapshot().link.state == "present")
+        await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        assert not notices(service, "autopilot_rebooted")
+        assert not notices(service, "another_board")
+        assert other.sets == []

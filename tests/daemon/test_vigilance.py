@@ -5,6 +5,7 @@ import json
 import stat
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from onboard.daemon.process.condition import Flips
 from onboard.daemon.process.signing_file import SigningFile
@@ -100,6 +101,26 @@ async def test_of_two_vehicles_on_one_link_it_is_said_whose_it_is(document, daem
             assert service.link.autopilot.system == 2
             assert len(texts) == (0 if chosen else 1)
             assert all("system 1 is" in text and "for system 2" in text for text in texts)
+
+
+@virtual_time
+async def test_ground_stations_of_one_id_are_no_lost_frames(document, daemon, port):
+    """Each counts its own packets; of both together every second one seems to have jumped."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        await until(lambda: service.link.presence.proven)
+        first, second = (mavlink.MAVLink(None, srcSystem=255, srcComponent=190) for _ in range(2))
+        for number in range(20):
+            for station, ahead in ((first, 0), (second, 100)):
+                station.seq = number + ahead
+                beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station)
+                vehicle._transport.sendto(beat, vehicle._address)
+            await asyncio.sleep(0.1)
+        assert service.snapshot().link.counters["lost"] == 0
+        vehicle._mav.seq += 4  # it does not count by itself
+        await asyncio.sleep(1.0)
+        counters = service.snapshot().link.counters
+        assert counters["lost"] == 3
+        assert counters["heard"] + 40 <= counters["frames"]
 
 
 @virtual_time

@@ -13,6 +13,7 @@ from tests.daemon.daemons import (
     convinced,
     held_back,
     in_force,
+    notices,
     push_done,
     ticks,
     until,
@@ -63,6 +64,8 @@ async def test_another_board_does_not_get_it_while_the_daemon_is_on(document, da
         await settled(service)
         assert vehicle.sets == []
         assert service.snapshot().push.proposals == ()
+        (text,) = notices(service, "another_board")
+        assert "another board answers as system 1" in text
 
 
 @pytest.mark.parametrize("how", ["restart", "reboot"])
@@ -91,6 +94,7 @@ async def test_the_same_board_after_a_reboot_goes_on(document, daemon, port):
         await learned_but_not_written(service, vehicle)
         vehicle.reboot()
         await until(lambda: service.snapshot().push.can_roll_back == (1,))
+        assert not notices(service, "another_board")
         assert in_force(vehicle) == pytest.approx(WANTED.scale + WANTED.offset, rel=1e-6)
 
 

@@ -47,6 +47,9 @@ class StreamingAutopilot:
         if self.unsupported:
             return [self._ack(mavlink.MAV_RESULT_UNSUPPORTED)]
         assert interval_ms == int(interval_ms), "ArduPilot cuts to whole ms"
+        if interval_ms == 0.0:  # as often as by itself: never
+            self.intervals.pop(name, None)
+            return [self._ack(mavlink.MAV_RESULT_ACCEPTED)]
         if name in self.unknown or interval_ms < self.fastest_ms:
             self.denials += 1
             return [self._ack(mavlink.MAV_RESULT_DENIED)]

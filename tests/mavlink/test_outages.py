@@ -119,6 +119,20 @@ async def test_who_goes_and_comes_back_is_one_warning_and_one_recovery(
 
 
 @virtual_time
+async def test_a_line_that_falls_silent_was_lost_when_the_last_byte_had_come(
+    tmp_path, monkeypatch, caplog
+):
+    caplog.set_level(logging.INFO)
+    endpoint = "tcp:127.0.0.1:5760"
+    async with connecting(endpoint, air := Absence(), tmp_path, monkeypatch):
+        await air.beat(20.0)
+        await asyncio.sleep(25.0)
+        await air.beat(30.0)
+    (_, _), (_, text) = lines(caplog, endpoint)
+    assert 24.0 <= float(re.search(r"after (\d+) s", text).group(1)) <= 28.0
+
+
+@virtual_time
 async def test_another_reason_is_told_and_the_same_ones_by_turns_are_not(
     tmp_path, monkeypatch, caplog
 ):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from onboard.core.inputs.boot_time import LONGEST_DELAY_S
 from onboard.mavlink.autopilot import (
     AutopilotFound,
     AutopilotReturned,
@@ -297,3 +298,49 @@ def test_in_a_push_and_where_an_id_is_configured_nothing_is_followed():
         for _ in range(20):
             wire.second(HERE, source=RENAMED)
         assert wire.presence.source == VEHICLE
+
+
+@pytest.mark.parametrize("apart", [1.2 * LONGEST_DELAY_S, -1.2 * LONGEST_DELAY_S, 300.0])
+@pytest.mark.parametrize(("committed", "way"), [(True, HERE), (False, THERE)])
+def test_another_vehicle_under_its_name_does_not_take_the_place_of_one_that_was_learned(
+    committed, way, apart
+):
+    """Both were heard, with clocks of their own: what is silent is not what still speaks."""
+    wire = Wire(committed=committed)
+    for _ in range(30):
+        wire.second(HERE)
+        wire.now -= 1.0
+        wire.second(THERE, offset=100.0 + apart)
+    for _ in range(30):
+        wire.second(THERE, offset=100.0 + apart)
+    assert wire.presence.way == way
+    assert wire.presence.namesake(wire.now) is committed
+    for _ in range(3):
+        wire.second(HERE)
+    assert wire.presence.way == way
+    assert (AutopilotReturned() in wire.events) is True
+
+
+def test_a_vehicle_that_was_heard_by_two_ways_and_reboots_is_no_other_one():
+    """What stood beside it was itself, and after the reboot it is only heard by the second."""
+    wire = Wire(committed=True)
+    for _ in range(30):
+        wire.second(HERE, OTHER_ENDPOINT)
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    for _ in range(3):
+        wire.second(OTHER_ENDPOINT, offset=-wire.now)
+    assert wire.presence.way == OTHER_ENDPOINT
+
+
+def test_a_way_that_is_late_is_no_other_vehicle():
+    """By a radio that holds everything back for as long as any does, the clock is behind."""
+    wire = Wire(committed=True)
+    for _ in range(30):
+        wire.second(HERE)
+        wire.now -= 1.0
+        wire.second(OTHER_ENDPOINT, offset=100.0 - 0.9 * LONGEST_DELAY_S)
+    assert not wire.presence.namesake(wire.now)
+    wire.silence(HEARTBEAT_TIMEOUT_S + 1.0)
+    for _ in range(3):
+        wire.second(OTHER_ENDPOINT, offset=100.0 - 0.9 * LONGEST_DELAY_S)
+    assert wire.presence.way == OTHER_ENDPOINT

@@ -237,3 +237,34 @@ def test_another_vehicle_is_not_asked_for_it():
     assert "ATTITUDE_QUATERNION" in w.states()
     w.streams.start(2, 1, w.now)
     assert "ATTITUDE_QUATERNION" not in w.states()
+
+
+def told(name, value):
+    return received(mavlink.MAVLink_param_value_message(name.encode(), value, 6, 900, 65535))
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.05, 0.3, 10.0])
+@pytest.mark.parametrize("loss", [0.0, 0.3])
+def test_of_an_accelerometer_that_is_not_there_nothing_is_asked_any_more(after_s, loss):
+    """Also where that is told while the question is on its way; and again when there is one."""
+    w = world([("RAW_IMU", 50.0), ("SCALED_IMU2", 50.0), ("SCALED_IMU3", 50.0)], loss=loss)
+    w.run(after_s)
+    w.exchange(w.streams.feed(told("INS_ACC3_ID", 0.0), w.now))
+    w.exchange(w.streams.feed(told("INS_ACC2_ID", 2753028.0), w.now))
+    w.run(60.0)
+    assert w.autopilot.intervals.get("SCALED_IMU3", 0.0) == 0.0
+    asked = len(w.autopilot.asked)
+    w.run(120.0)
+    assert len(w.autopilot.asked) == asked
+    assert w.states() == {
+        "RAW_IMU": StreamState.FLOWING,
+        "SCALED_IMU2": StreamState.FLOWING,
+        "SCALED_IMU3": StreamState.UNSUPPORTED,
+    }
+    w.autopilot.reboot()
+    w.streams.start(1, 1, w.now)
+    w.run(30.0)
+    assert w.autopilot.intervals == {"RAW_IMU": 20.0, "SCALED_IMU2": 20.0}
+    w.exchange(w.streams.feed(told("INS_ACC3_ID", 2753036.0), w.now))
+    w.run(60.0)
+    assert w.states()["SCALED_IMU3"] is StreamState.FLOWING

@@ -17,6 +17,8 @@ import numpy as np
 from onboard.core.vehicle.effects.wind import Wind
 from onboard.core.vehicle.effects.wind_change import PLAUSIBLE_M_S
 from onboard.core.vehicle.fit import Fit
+from onboard.core.vehicle.flight import Flight
+from onboard.core.vehicle.limits import BLOCK_S
 from onboard.core.vehicle.matching import deviance, likelier
 from onboard.core.vehicle.model import ForceModel
 from onboard.core.vehicle.sudden import by_chance, gained, moments_of, white
@@ -50,3 +52,15 @@ def front_of(
     if by_chance((deviance(fit) - deviance(its)) / its.scale, len(places), len(moments)):
         return None
     return (moment, its) if deviance(its) < deviance(likelier(gradual)) else None
+
+
+def on_both_sides(flight: Flight, moment: float | None) -> bool:
+    """Whether as much flight is used on either side of a moment, s, as tells a wind.
+
+    A front is looked for before it is known what of the flight the model does not describe: of
+    which a take-off, say, is most of what is before it.
+    """
+    if moment is None:
+        return True
+    before = int(np.count_nonzero(flight.t < moment))
+    return min(before, len(flight) - before) * flight.step_s >= BLOCK_S

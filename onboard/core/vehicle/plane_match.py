@@ -20,7 +20,7 @@ from onboard.core.vehicle.effects.wind_change import CHANGE, EVERY_S
 from onboard.core.vehicle.effects.wind_profile import WindProfile
 from onboard.core.vehicle.fit import Fit
 from onboard.core.vehicle.flight import Flight
-from onboard.core.vehicle.front import front_of
+from onboard.core.vehicle.front import front_of, on_both_sides
 from onboard.core.vehicle.limits import (
     FEWEST_STEPS,
     MOST_BEYOND,
@@ -123,8 +123,12 @@ def _found(
     flying = unstalled(flight, frame, np.zeros((flight.parts, 2)))
     if len(flying) < FEWEST_STEPS:
         return None
-    form, first = _with_front(flying, frame, force_sigma, form)
-    found = matched(form.model(flying, frame, force_sigma), first)
+    blown, first = _with_front(flying, frame, force_sigma, form)
+    found = matched(blown.model(flying, frame, force_sigma), first)
+    if blown is form or on_both_sides(found.model.flight, blown.wind_from):
+        form = blown
+    else:  # what told of it was no part of the model, and has been left out since
+        found = matched(form.model(flying, frame, force_sigma))
     places = found.model.indices("wind")
     winds = found.fit.theta[places].reshape(-1, 2)
     flying = unstalled(flight, frame, winds)

@@ -109,6 +109,11 @@ class Examiner:
         """Accelerometers of the flight under examination: none is judged before all are."""
         return () if self._frozen is None else tuple(self._frozen.flight.imus)
 
+    def unjudged_s(self, flight: Calibrator) -> float:
+        """Seconds of what was flown that no diagnosis has been made of."""
+        frozen = 0.0 if self._frozen is None else self._frozen.support.trusted_s
+        return max(frozen, flight.flown_s - self._judged_s)
+
     def landed(self, flight: Calibrator, at: float | None = None) -> None:
         """A flight has ended; nothing is to be said of being armed without having flown.
 

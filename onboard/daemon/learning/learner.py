@@ -120,6 +120,7 @@ class Learner:
         if before != there and not same:
             if before is not None:
                 self._shelve(before)
+                self._tell_of_another(before, there)
             loaded = self._take_from_shelf(calibrator)
             kept = kept or loaded
         self._kept = Kept(calibrator.sums)
@@ -135,20 +136,36 @@ class Learner:
             self._note(event)
         self._before_gap = meanings(self._calibrator.parameters.values)
 
+    def _tell_of_another(self, before: Identity, there: Identity) -> None:
+        """Nothing that was shown a moment ago is of this one: that is not to look like a fault."""
+        if there.surely_not(before):
+            text = (
+                f"another board answers as system {there.system_id}: what was learned of the one "
+                "before is kept for that one, a flight that it has not ended is not"
+            )
+            self._tell("another_board", text, warning=True)
+
     def _take_from_shelf(self, calibrator: Calibrator) -> JudgedFlight | None:
         """Lay what is on the disk beside this calibrator; the last flight that was judged."""
         if self._identity is None:
             return None
         try:
-            return self._shelf.load(self._identity, calibrator)
+            flight = self._shelf.load(self._identity, calibrator)
         except StateError as error:
             self._tell("state_refused", f"starting from nothing: {error}", warning=True)
             return None
+        if self._shelf.lost_s >= 1.0:
+            text = (
+                f"{self._shelf.lost_s:.0f} s of flight were not diagnosed before the service, or "
+                "the power, went: nothing of that is kept; after a landing leave both on"
+            )
+            self._tell("flight_lost", text, warning=True)
+        return flight
 
     def _shelve(self, whose: Identity) -> None:
         """Before another board takes over; a disk that does not take it costs that board's sums."""
         try:
-            self._shelf.save(whose, self._kept, self._flight, self._wall_clock())
+            self._save(whose, self._wall_clock())
         except StateError as error:
             self._tell("save_failed", str(error), warning=True)
 
@@ -240,8 +257,12 @@ class Learner:
             StateError: the disk does not take them.
         """
         if self._identity is not None:
-            self._shelf.save(self._identity, self._kept, self._flight, saved_at)
+            self._save(self._identity, saved_at)
             trim()
+
+    def _save(self, whose: Identity, saved_at: float) -> None:
+        unjudged_s = self._examiner.unjudged_s(self._calibrator) if self._unjudged else 0.0
+        self._shelf.save(whose, self._kept, self._flight, saved_at, unjudged_s=unjudged_s)
 
     def _keep(self, examined: Examined) -> None:
         """Keep sums of what nothing was missing in, and nothing false."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 
@@ -23,6 +24,8 @@ class Shelf:
 
     def __init__(self, store: Store) -> None:
         self.counters: Counter[str] = Counter()
+        self.lost_s = 0.0
+        """Seconds that were flown before what was loaded was saved, and are not in it."""
         self._store = store
 
     def load(self, whose: Identity, calibrator: Calibrator) -> JudgedFlight | None:
@@ -31,6 +34,7 @@ class Shelf:
         Raises:
             StateError: what is there is damaged, or of another version.
         """
+        self.lost_s = 0.0
         try:
             saved = self._store.load(whose.system_id, whose.board)
             if saved is None:
@@ -45,6 +49,7 @@ class Shelf:
             aside = self._store.set_aside(whose.system_id, whose.board)
             raise StateError(f"{error}, set aside as {aside}") from None
         self.counters["state_resumed"] += 1
+        self.lost_s = saved.unjudged_s if math.isfinite(saved.unjudged_s) else 0.0
         return decode(saved.flight) if saved.flight else None
 
     def save(
@@ -53,8 +58,10 @@ class Shelf:
         sums: Iterable[SavedEngine],
         flight: JudgedFlight | None,
         saved_at: float,
+        *,
+        unjudged_s: float,
     ) -> None:
-        """Write a board's sums and its last flight.
+        """Write a board's sums and its last flight, and how much was flown that is in neither.
 
         Raises:
             StateError: the disk does not take them.
@@ -66,6 +73,7 @@ class Shelf:
             saved_at=saved_at,
             board=whose.board,
             flight=b"" if flight is None else encode(flight),
+            unjudged_s=unjudged_s,
         )
         self.counters["saves"] += 1
 

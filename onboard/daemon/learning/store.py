@@ -27,7 +27,10 @@ LARGEST = 64_000_000
 
 
 class Saved(msgspec.Struct, frozen=True, kw_only=True):
-    """The sums of one board; ``saved_at`` is Unix time, ``flight`` the last one, or empty."""
+    """The sums of one board; ``saved_at`` is Unix time, ``flight`` the last one, or empty.
+
+    ``unjudged_s``: seconds that were flown by then and are in neither, for they were not diagnosed.
+    """
 
     schema: int = SCHEMA
     version: str
@@ -37,6 +40,7 @@ class Saved(msgspec.Struct, frozen=True, kw_only=True):
     check: int
     board: str = ""
     flight: bytes = b""
+    unjudged_s: float = 0.0
 
 
 class Store:
@@ -125,6 +129,7 @@ class Store:
         saved_at: float,
         board: str = "",
         flight: bytes = b"",
+        unjudged_s: float = 0.0,
     ) -> None:
         """Replace the file; it is on the disk when this returns.
 
@@ -140,6 +145,7 @@ class Store:
             sums=sums,
             check=crc32(sums + flight),
             flight=flight,
+            unjudged_s=unjudged_s,
         )
         temporary = path.with_suffix(".new")
         try:

@@ -81,6 +81,8 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         ),
         "heartbeats_contradict": Line(WARNING, "two speak as the vehicle, not writing"),
         "two_vehicles": Line(WARNING, "two vehicles have one system id, not writing"),
+        "flight_lost": Line(WARNING, "last flight was not diagnosed, it is lost"),
+        "another_board": Line(WARNING, "another board answers, it starts anew"),
         "rivals": Line(WARNING, "somebody else speaks as the vehicle"),
         "twin": Line(WARNING, "another onboard service is there"),
         "samples_contradict": Line(WARNING, "samples contradict, not writing"),

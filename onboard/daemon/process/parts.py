@@ -94,7 +94,8 @@ class Parts:
         company = Company(link, board, parameters)
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, calendar)
-        hindrance = Hindrance(link, parameters, traffic, has_key=signing is not None)
+        streams = Streams(settings.stream_requests(configuration.link.rates))
+        hindrance = Hindrance(link, parameters, streams, traffic, has_key=signing is not None)
         link.presence.held = lambda: pusher.busy
         link.presence.committed = lambda: pusher.has_written or handover.has_learned
         return cls(
@@ -106,7 +107,7 @@ class Parts:
             link=link,
             board=board,
             company=company,
-            streams=Streams(settings.stream_requests(configuration.link.rates)),
+            streams=streams,
             parameters=parameters,
             observed=observed,
             traffic=traffic,

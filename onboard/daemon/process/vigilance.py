@@ -93,6 +93,8 @@ class Vigilance:
             yield "unsigned_vehicle", text
         if text := self._hindrance.mute(now):
             yield "unanswered", text
+        elif text := self._hindrance.untold(now):
+            yield "untold", text
         elif text := self._hindrance.seldom(now):
             yield "seldom", text
 
@@ -137,10 +139,22 @@ class Vigilance:
 
     def _others(self, now: float) -> Iterator[tuple[str, str]]:
         others, autopilot = self._link.presence.others(now), self._link.autopilot
-        if not others or autopilot is None:
+        if autopilot is None:
+            return
+        silent = self._link.state is AutopilotState.SILENT
+        if silent and self._link.presence.namesake(now):
+            yield (
+                "another_speaks",
+                (
+                    f"the vehicle is silent, and another one, by its clock, speaks as system "
+                    f"{autopilot.system}, too: a restart of the service takes that one up; "
+                    "give each an id of its own"
+                ),
+            )
+        if not others:
             return
         whose = ", ".join(map(str, others))
-        if self._link.state is AutopilotState.SILENT:
+        if silent:
             yield (
                 "another_speaks",
                 (

@@ -106,6 +106,11 @@ class ParameterWatch:
         """Names of the first accelerometer that are needed and not known."""
         return tuple(name for name in FIRST if name not in self.values)
 
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """Those of them that were asked for in vain, while others are answered."""
+        return tuple(name for name in self.missing if name in self._answered)
+
     def unanswered(self, now: float) -> float:
         """For how long, s, it has been asked in vain: a word that nobody asked for is no answer."""
         if self._in_vain < limits.IN_VAIN or not self.enabled:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
 from onboard.daemon.view.snapshot import (
     EndpointView,
     LinkView,
@@ -9,6 +13,11 @@ from onboard.daemon.view.snapshot import (
 )
 from onboard.mavlink.link import Link
 from onboard.push.policy import VehicleCondition
+
+SEQUENCE: Final[Mapping[str, str]] = MappingProxyType(
+    {"heard": "received", "lost": "lost", "late": "late", "duplicated": "duplicated"}
+)
+"""Counters that the sequence numbers tell, and what each is for one source."""
 
 
 def link_view(
@@ -31,9 +40,13 @@ def link_view(
         for statistics in connection.statistics():
             for name in ("frames", "bad_bytes", "bad_frames", "bad_signatures", "unknown", "sent"):
                 counters[name] = counters.get(name, 0) + getattr(statistics, name)
-            for source in statistics.sources.values():
-                for name in ("lost", "late", "duplicated"):
-                    counters[name] = counters.get(name, 0) + getattr(source, name)
+            for source, numbered in statistics.sources.items():
+                # Of the vehicle alone: two ground stations often have one id, whose numbers then
+                # go to and fro as if all between them were lost.
+                counts = link.presence.source in (None, source)
+                for name, field in SEQUENCE.items():
+                    told = getattr(numbered, field) if counts else 0
+                    counters[name] = counters.get(name, 0) + told
         counters["rationed"] = counters.get("rationed", 0) + connection.refused
         for name in ("dropped", "connects", "failures"):
             counters[name] = counters.get(name, 0) + getattr(connection, name)

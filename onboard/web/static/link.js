@@ -7,8 +7,8 @@ const ABSENT = ["unsupported", "silent"];
 const SLOW = 0.7; // of the rate that was granted
 
 export function showLink(link, counters = {}) {
-  const { frames = 0, lost = 0, bad_frames: damaged = 0, reboots = 0 } = link.counters;
-  const share = frames + lost > 0 ? (100 * lost) / (frames + lost) : 0;
+  const { frames = 0, heard = frames, lost = 0, bad_frames: damaged = 0, reboots = 0 } = link.counters;
+  const share = heard + lost > 0 ? (100 * lost) / (heard + lost) : 0;
   const facts = [
     ["Autopilot", link.system_id === null ? "none heard yet" : `${vehicleInWords(link)}, ${link.state}`],
     ...link.endpoints.map((e) => [e.endpoint, e.reason ? `${e.state}: ${e.reason}` : e.state]),

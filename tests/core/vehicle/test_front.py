@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,3 +35,16 @@ def test_a_front_is_a_wind_that_becomes_another_and_no_gusts(seed, before, by, g
     close = 4.0 * np.sqrt(2.0) * max(match.wind.sigma_north, match.wind.sigma_east)
     assert np.asarray(match.wind.law[0]) == pytest.approx(np.array(before), abs=close)
     assert np.asarray(match.wind.law[-1]) == pytest.approx(np.add(before, by), abs=close)
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_what_the_model_does_not_describe_at_the_start_is_no_front(seed):
+    """Of what is before the only moment that it could have, a second is left in the end."""
+    flight = plane_flight(seed=seed, seconds=150.0)
+    since, rng = flight.t - flight.t[0], np.random.default_rng(seed)
+    wrong = (since < 5.5) | ((since > 6.8) & (since < 12.3))
+    f_b = flight.f_b.copy()
+    f_b[wrong] += rng.normal(size=(np.count_nonzero(wrong), 3)) * np.array([2.0, 6.0, 8.0])
+    match = matched(replace(flight, f_b=f_b))
+    assert names(match) == set()
+    assert "the wind became another" not in match.note

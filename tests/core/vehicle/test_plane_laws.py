@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from onboard.core.vehicle.effects.airspeed_scale import seen_by_a_pitot
 from onboard.core.vehicle.plane import plane_commands
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 from onboard.core.vehicle.signals import Signals, Stream
@@ -147,3 +148,25 @@ def test_flight_past_the_stall_is_left_out_and_said():
     assert names(match) == set()
     assert "the wing is stalled, or nearly so, for 9 s, of which nothing is told" in match.note
     assert "stalled" not in matched(plane_flight(seed=47, seconds=150.0)).note
+
+
+@pytest.mark.parametrize(
+    ("degrees", "share"), [(0.0, 1.0), (20.0, 1.0), (55.0, 0.5**0.5), (90.0, 0.0)]
+)
+@pytest.mark.parametrize("aside", [1, 2])
+def test_a_pitot_tube_sees_less_of_what_comes_from_aside(degrees, share, aside):
+    u_b = np.zeros((1, 3))
+    u_b[0, [0, aside]] = 20.0 * np.cos(np.radians(degrees)), 20.0 * np.sin(np.radians(degrees))
+    assert seen_by_a_pitot(u_b) == pytest.approx(20.0 * share, abs=1e-9)
+
+
+def test_an_airspeed_sensor_in_a_slip_reads_no_other_wind_and_has_no_other_scale():
+    wind = np.array([3.0, -2.0, 0.0])
+    flight = plane_flight(seed=4, seconds=150.0, wind=wind[:2], reading=1.0, kicks=1.9)
+    u_b = flight.v_b - np.einsum("nij,j->ni", flight.R_bn, wind)
+    share = seen_by_a_pitot(u_b) / np.linalg.norm(u_b, axis=1)
+    assert np.min(share) < 0.97
+    match = matched(replace(flight, airspeed=flight.airspeed * share))
+    assert names(match) == {"wind"}
+    assert [match.wind.north, match.wind.east] == pytest.approx(wind[:2], abs=0.1)
+    assert "airspeed sensor" not in match.note

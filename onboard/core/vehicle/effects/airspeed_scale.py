@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,8 @@ from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
 
 FLOOR = 0.02
 """Of the scale: a pitot tube's own error [data sheet]."""
+PITOT_RAD = math.radians(20.0)
+"""Between flow and nose: up to so far aside a pitot tube reads all of the speed [data sheet]."""
 COLUMN = 3
 """Of the prediction: after the three of the force."""
 
@@ -20,6 +23,21 @@ COLUMN = 3
 def simulated_scale(rho: Array) -> float:
     """What ArduPilot's simulator reads over the equivalent airspeed: it corrects density twice."""
     return float(np.mean(np.sqrt(rho / SEA_LEVEL_DENSITY)))
+
+
+def seen_by_a_pitot(u_b: Array) -> Array:
+    """(n,) what a tube along the nose sees of the speed through the air, m/s.
+
+    All of it up to :data:`PITOT_RAD`, then as much as a cosine that ends across the flow: what
+    ArduPilot's simulator has, and nearly what tubes do.
+
+    Args:
+        u_b: (n, 3) velocity through the air in body axes, m/s.
+    """
+    angle = np.arctan2(np.linalg.norm(u_b[:, 1:], axis=1), u_b[:, 0])
+    beyond = np.clip((angle - PITOT_RAD) / (0.5 * np.pi - PITOT_RAD), 0.0, 1.0)
+    out: Array = np.linalg.norm(u_b, axis=1) * np.cos(0.5 * np.pi * beyond)
+    return out
 
 
 class AirspeedScale(Effect):
@@ -41,8 +59,8 @@ class AirspeedScale(Effect):
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Predict the reading."""
-        speed = np.linalg.norm(air.u_b, axis=1)
-        air.force_b[:, COLUMN] += values[0] * speed * np.sqrt(air.rho / SEA_LEVEL_DENSITY)
+        seen = seen_by_a_pitot(air.u_b)
+        air.force_b[:, COLUMN] += values[0] * seen * np.sqrt(air.rho / SEA_LEVEL_DENSITY)
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:
         """Against the simulator's."""
