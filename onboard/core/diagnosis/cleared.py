@@ -16,6 +16,7 @@ from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import false_fixes, misled, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
+from onboard.core.diagnosis.toneless import at_a_glance, unseen
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
@@ -26,13 +27,12 @@ from onboard.core.inputs.expected_force import (
     expected,
     shaped,
     spectrum,
-    swung,
-    tones,
     white,
 )
 from onboard.core.inputs.limits import WALK_SHARE
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.spikes import Spikes, spikes_of
+from onboard.core.inputs.tones import density_of, stretches_of, without
 from onboard.core.maths.arrays import Array
 from onboard.core.model.regressors import Family
 from onboard.core.physics.catalogue import catalogue
@@ -154,22 +154,10 @@ def _without_spikes(
 
 
 def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:
-    """Whether velocities seem to be likelier without some samples, at a glance.
-
-    That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
-    that smooths: a span or an antenna may have been found for the sake of these very samples.
-    """
+    """Whether velocities seem to be likelier without some samples."""
     if spikes.walk**2 < WALK_SHARE * np.max(_walk_s(full.noise, spikes.batches)):
         return False
-    plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
-    told = []
-    for batches in (spikes.batches, as_read):
-        t0 = full.point.skew_from
-        made = Examination(
-            engine, (), t0=t0, batches=batches, start=full, point=plain, traced=False
-        )
-        made.once()
-        told.append(made.log_likelihood)
+    told = [at_a_glance(engine, full, flight) for flight in (spikes.batches, as_read)]
     return 2.0 * (told[0] - told[1]) > CLEARLY
 
 
@@ -230,11 +218,11 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     density = spectrum(batches)
     if density is None:
         return sampled
-    tone, fixes = tones(density), sum(len(b.fixes) for b in batches)
-    # Of what not even the best receiver could tell, nothing is asked.
-    if fixes * np.sum((swung(batches, tone) / LIMITS["velocity"][0]) ** 2) > CLEARLY:
-        toneless = asked.examined(expected(batches, density, tone), sampled)
+    tones = unseen(asked.engine, sampled, batches)
+    if tones:
+        toneless = asked.examined(without(batches, tones), sampled)
         if toneless.log_likelihood > sampled.log_likelihood:
+            tone = density_of(tones, density, stretches_of(batches))
             sampled, batches = toneless, toneless.batches
             density = np.maximum(density - tone, np.min(density, axis=0))
     little = np.all(white(density) <= LIMITS["force_walk"][0] ** 2) and not sampled.found_noisy
