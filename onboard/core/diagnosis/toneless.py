@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import CLEARLY, MOST_TONES
+from onboard.core.diagnosis.limits import CLEARLY, LEFT_OF_TONE, MOST_TONES
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
+from onboard.core.filter.traces import residual
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.tones import Tone, stretches_of, tones_of, without
 
@@ -16,16 +19,17 @@ from onboard.core.inputs.tones import Tone, stretches_of, tones_of, without
 def unseen(engine: Engine, full: Examination, batches: Sequence[Batch]) -> list[Tone]:
     """Tones without which velocities are likelier, one after the other.
 
-    First those of a part of the flight, then what the whole of it has besides; of either those
-    first that the velocity has most of if they are real.  Of what not even the best receiver could
-    tell, nothing is asked.
+    In the order of their kinds, of each those first that the velocity has most of if they are real.
+    Nothing is asked of what not even the best receiver could tell, nor of what is more than is left
+    of the velocity: that one has been seen.
     """
-    told, fixes = LIMITS["velocity"][0], sum(len(batch.fixes) for batch in batches)
-    each = fixes / max(stretches_of(batches), 1)
-    by_worth = [
-        (each * len(tone.lines) * tone.variance / told**2, tone) for tone in tones_of(batches)
-    ]
-    asked = [(tone.whole, -worth, tone) for worth, tone in by_worth if worth > CLEARLY]
+    fixes, count = sum(len(batch.fixes) for batch in batches), max(stretches_of(batches), 1)
+    told, left = CLEARLY * LIMITS["velocity"][0] ** 2, LEFT_OF_TONE * _left(full)
+    asked = []
+    for tone in tones_of(batches):
+        mean = tone.variance * len(tone.lines) / count
+        if fixes * mean > told and mean < left:
+            asked.append((tone.kind, -mean, tone))
     asked = sorted(asked, key=lambda one: one[:2])[:MOST_TONES]
     found: list[Tone] = []
     best = at_a_glance(engine, full, batches) if asked else 0.0
@@ -48,3 +52,10 @@ def at_a_glance(engine: Engine, full: Examination, batches: Sequence[Batch]) -> 
     )
     made.once()
     return made.log_likelihood
+
+
+def _left(full: Examination) -> float:
+    """(m/s)^2, mean square of what is left of velocities."""
+    traces = full.traces
+    off = residual(traces.innovation, traces.columns, full.found().theta)
+    return float(np.mean(np.nansum(off**2, axis=1))) if len(off) else 0.0

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 
 import numpy as np
 
@@ -48,15 +49,27 @@ class Line:
         return slice(self.first, self.first + len(self.density))
 
 
+class Kind(IntEnum):
+    """Of a tone: of a part of the flight, of all of it, or of a part and not quite steady."""
+
+    PART = 0
+    WHOLE = 1
+    RESTLESS = 2
+
+
+WIDE = {Kind.PART: 1, Kind.RESTLESS: 2}
+"""Times as wide as narrow ones: how far off what lies beside begins; where it ends, as a power."""
+
+
 @dataclass(slots=True)
 class Tone:
     """Lines of one axis by the stretches of a flight, and the variance of the velocity if real.
 
-    ``whole`` if it is one of the whole flight's spectrum.
+    The ``kind`` of which nothing is left of the others comes last.
     """
 
     axis: int
-    whole: bool
+    kind: Kind
     lines: dict[int, Line] = field(default_factory=dict)
     swung: list[float] = field(default_factory=list)
 
@@ -70,37 +83,44 @@ def tones_of(batches: Sequence[Batch]) -> list[Tone]:
     """Every tone of a flight: those of its parts, and those of it as a whole."""
     step, count = step_of(batches), 0
     total, last = np.zeros(1), list[Array]()
-    found: list[Tone] = []
+    found: dict[Kind, list[Tone]] = {kind: [] for kind in WIDE}
     for density in _stretches(batches, step):
         total, count = total + density, count + 1
         last = [*last[-TONE_STRETCHES + 1 :], density]
         if len(last) == TONE_STRETCHES:
             # At either end of a flight there are no other neighbours.
             at = [count - 2] if count > TONE_STRETCHES else [0, 1]
-            _go_on(found, _lines(np.mean(last, axis=0)), at, step)
+            mean = np.mean(last, axis=0)
+            for kind, tones in found.items():
+                _go_on(tones, kind, _lines(mean, WIDE[kind]), at, step)
+    every = [tone for tones in found.values() for tone in tones]
     if count >= TONE_STRETCHES:
-        for tone in [tone for tone in found if count - 2 in tone.lines]:
+        for tone in [tone for tone in every if count - 2 in tone.lines]:
             tone.lines[count - 1] = tone.lines[count - 2]
     if not count:
         return []
-    if count <= TONE_STRETCHES:
-        found = []  # they are those of the whole
-    return [*found, *_of_the_whole(total / count, count, step)]
+    if count <= TONE_STRETCHES:  # those of parts are those of the whole
+        every = found[Kind.RESTLESS]
+    return [*every, *_of_the_whole(total / count, count, step)]
 
 
-def tones(density: Array) -> Array:
-    """(bins, 3) density that narrow lines of a spectrum (bins, 3) have on top of what is beside."""
+def tones(density: Array, wide: int = 1) -> Array:
+    """(bins, 3) density that narrow lines of a spectrum (bins, 3) have on top of what is beside.
+
+    Those of a motor that is restless are a number of times as ``wide``.
+    """
     there = averaged(density, SPECTRUM_BINS)
     out, n = np.zeros_like(there), len(there)
+    apart, ratio = wide * TONE_BINS, TONE_BESIDE**wide
     # Slower ones have nothing beside them that the window does not smear them into.
-    i = np.arange(math.ceil(TONE_BINS / (1.0 - 1.0 / TONE_BESIDE)), n)
+    i = np.arange(math.ceil(apart / (1.0 - 1.0 / ratio)), n)
     if not len(i):
         return out
     sums = np.concatenate([np.zeros((1, there.shape[1])), np.cumsum(there, axis=0)])
-    low = np.ceil(i / TONE_BESIDE).astype(int), i - TONE_BINS + 1
-    high = np.minimum(i + TONE_BINS, n), np.minimum(np.floor(i * TONE_BESIDE).astype(int) + 1, n)
+    low = np.ceil(i / ratio).astype(int), i - apart + 1
+    high = np.minimum(i + apart, n), np.minimum(np.floor(i * ratio).astype(int) + 1, n)
     below, above = ((sums[b] - sums[a]) / np.maximum(b - a, 1)[:, None] for a, b in (low, high))
-    beside = np.maximum(below, above)
+    beside = np.maximum(below, above) if wide == 1 else np.sqrt(below * above)
     out[i] = np.where(there[i] > TONE_STANDS_OUT * beside, there[i] - beside, 0.0)
     return out
 
@@ -151,9 +171,9 @@ def _samples(step: float) -> int:
     return 2 * round(RESOLVED_S / step / 2.0)
 
 
-def _lines(density: Array) -> list[tuple[int, Line]]:
+def _lines(density: Array, wide: int = 1) -> list[tuple[int, Line]]:
     """Axes and lines of a spectrum."""
-    there, tone = averaged(density, SPECTRUM_BINS), tones(density)
+    there, tone = averaged(density, SPECTRUM_BINS), tones(density, wide)
     out = []
     for axis in range(3):
         bins = np.flatnonzero(tone[:, axis])
@@ -171,7 +191,7 @@ def _variance(line: Line, step: float) -> float:
 
 
 def _go_on(
-    found: list[Tone], lines: Sequence[tuple[int, Line]], at: Sequence[int], step: float
+    found: list[Tone], kind: Kind, lines: Sequence[tuple[int, Line]], at: Sequence[int], step: float
 ) -> None:
     """Lines of some stretches, each with the tone that it is the next of, or a new one."""
     before = at[0] - 1
@@ -183,7 +203,7 @@ def _go_on(
             if tone.axis == axis and apart <= TONE_BINS and at[0] not in tone.lines:
                 break
         else:
-            tone = Tone(axis, whole=False)
+            tone = Tone(axis, kind)
             found.append(tone)
         tone.lines.update(dict.fromkeys(at, line))
         tone.swung.append(_variance(line, step))
@@ -193,7 +213,7 @@ def _of_the_whole(density: Array, count: int, step: float) -> Iterator[Tone]:
     """Tones that the spectrum of a flight has."""
     for axis, line in _lines(density):
         swung = [_variance(line, step)]
-        yield Tone(axis, whole=True, lines=dict.fromkeys(range(count), line), swung=swung)
+        yield Tone(axis, Kind.WHOLE, lines=dict.fromkeys(range(count), line), swung=swung)
 
 
 def _shares(tones: Sequence[Tone], bins: int) -> dict[int, Array]:
