@@ -16,7 +16,7 @@ from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.records import NotTestable
 from onboard.core.diagnosis.screening import false_fixes, misled, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
-from onboard.core.diagnosis.toneless import at_a_glance, unseen
+from onboard.core.diagnosis.toneless import unseen
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
@@ -154,10 +154,22 @@ def _without_spikes(
 
 
 def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine: Engine) -> bool:
-    """Whether velocities seem to be likelier without some samples."""
+    """Whether velocities seem to be likelier without some samples, at a glance.
+
+    That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
+    that smooths: a span or an antenna may have been found for the sake of these very samples.
+    """
     if spikes.walk**2 < WALK_SHARE * np.max(_walk_s(full.noise, spikes.batches)):
         return False
-    told = [at_a_glance(engine, full, flight) for flight in (spikes.batches, as_read)]
+    plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
+    told = []
+    for batches in (spikes.batches, as_read):
+        t0 = full.point.skew_from
+        made = Examination(
+            engine, (), t0=t0, batches=batches, start=full, point=plain, traced=False
+        )
+        made.once()
+        told.append(made.log_likelihood)
     return 2.0 * (told[0] - told[1]) > CLEARLY
 
 
@@ -218,7 +230,7 @@ def _felt(asked: _Asked, batches: Sequence[Batch]) -> Examination:
     density = spectrum(batches)
     if density is None:
         return sampled
-    tones = unseen(asked.engine, sampled, batches)
+    tones = unseen(sampled, batches)
     if tones:
         toneless = asked.examined(without(batches, tones), sampled)
         if toneless.log_likelihood > sampled.log_likelihood:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import CLEARLY, LEFT_OF_TONE, MOST_TONES
-from onboard.core.estimate.engine import Engine
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.traces import residual
 from onboard.core.inputs.segments import Batch
 from onboard.core.inputs.tones import Tone, stretches_of, tones_of, without
 
 
-def unseen(engine: Engine, full: Examination, batches: Sequence[Batch]) -> list[Tone]:
+def unseen(full: Examination, batches: Sequence[Batch]) -> list[Tone]:
     """Tones without which velocities are likelier, one after the other.
 
     In the order of their kinds, of each those first that the velocity has most of if they are real.
@@ -32,23 +30,21 @@ def unseen(engine: Engine, full: Examination, batches: Sequence[Batch]) -> list[
             asked.append((tone.kind, -mean, tone))
     asked = sorted(asked, key=lambda one: one[:2])[:MOST_TONES]
     found: list[Tone] = []
-    best = at_a_glance(engine, full, batches) if asked else 0.0
+    best = _at_a_glance(full, batches) if asked else 0.0
     for *_, tone in asked:
-        now = at_a_glance(engine, full, without(batches, [*found, tone]))
+        now = _at_a_glance(full, without(batches, [*found, tone]))
         if 2.0 * (now - best) > CLEARLY:
             found, best = [*found, tone], now
     return found
 
 
-def at_a_glance(engine: Engine, full: Examination, batches: Sequence[Batch]) -> float:
-    """Log-likelihood of the velocities of a flight with other samples.
+def _at_a_glance(full: Examination, batches: Sequence[Batch]) -> float:
+    """Log-likelihood of the velocities of a flight with other samples, noise as it was found.
 
-    That is, of the six and the receiver's delay alone, with the noise that was found, and nothing
-    that smooths: a span or an antenna may have been found for the sake of these very samples.
+    With every effect: of a tone that is nothing beside a drift, only what is left tells.
     """
-    plain = replace(full.point, window=0.0, shapes=(0.0,) * 4, antenna=(0.0,) * 3)
     made = Examination(
-        engine, (), t0=full.point.skew_from, batches=batches, start=full, point=plain, traced=False
+        full, full.families, t0=full.point.skew_from, batches=batches, start=full, traced=False
     )
     made.once()
     return made.log_likelihood
