@@ -97,10 +97,11 @@ def summary(result: Explanation) -> Iterator[RenderableType]:
     """What a pilot reads in ten seconds, and then the numbers."""
     d = result.diagnosis
     yield Text(f"{', '.join(result.files)}: accelerometer {d.imu}, {result.duration_s:.0f} s")
-    yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
-    yield from (Text(f"note: {note}") for note in result.notes)
     yield _plain(verdict.headline(d) + ".", f"bold {verdict.COLOURS[verdict.severity(d)]}")
     yield _answers(d, result.advice)
+    # After the answer, as on the page: most logs were cut off while they were written.
+    yield from (Text(f"damage: {note}", "yellow") for note in result.source.damage)
+    yield from (Text(f"note: {note}") for note in result.notes)
     if d.silent:
         return
     yield ""

@@ -170,8 +170,8 @@ def summary(result: Match) -> Iterator[RenderableType]:
     if result.simulation is not None:
         names.insert(0, result.simulation.name)
     yield Text(f"{' against '.join(names)}: {vehicle.vehicle}, {vehicle.seconds:.0f} s in the air")
-    yield from (Text(f"damage: {note}", "yellow") for note in result.damage)
     yield Text(f"{headline(result)}.", style=f"bold {COLOURS[result.verdict]}")
+    yield from (Text(f"damage: {note}", "yellow") for note in result.damage)
     if result.effects:
         yield from ("", _effects(result))
     yield from ("", _facts(result))

@@ -64,6 +64,14 @@ def test_terminal_document_and_page_say_what_was_skipped(log, tmp_path, capsys, 
         assert f"Damage: {sentence}" in words
 
 
+def test_the_answer_comes_before_what_was_skipped(log, capsys):
+    assert run(["explain", str(log)]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.strip()]
+    assert lines[0].startswith(log.name)
+    first = next(i for i, line in enumerate(lines) if line.startswith("damage:"))
+    assert any(line.startswith(("To do", "To fly")) for line in lines[:first])
+
+
 @pytest.mark.parametrize("verb", ["replay", "explain"])
 def test_of_a_whole_recording_nothing_is_said(tmp_path, capsys, verb):
     log, page, file = tmp_path / "a.BIN", tmp_path / "p.html", tmp_path / "d.json"

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.limits import CLEARLY
+from onboard.core.diagnosis.toneless import unseen
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import WORTH_A_SEARCH
 from onboard.core.filter.limits import LIMITS
@@ -28,11 +28,10 @@ from onboard.core.inputs.expected_force import (
     expected,
     levelled,
     spectrum,
-    swung,
-    tones,
     white,
 )
 from onboard.core.inputs.segments import Batch
+from onboard.core.inputs.tones import density_of, stretches_of, without
 from onboard.core.maths.arrays import Array
 from onboard.core.model.noise_level import DOUBT, NoiseLevel
 from onboard.core.model.regressors import Family
@@ -125,7 +124,7 @@ class Asked:
 def felt(asked: Asked, batches: Sequence[Batch]) -> Examination:
     """A flight examined with the force that its samples let one expect, or as it was sampled.
 
-    Without a tone that they have, if its velocity is likelier so.  Then without the noise, whose
+    Without tones that they have, if its velocity is likelier so.  Then without the noise, whose
     levels are looked for where it moves one of the six.  Where it only may drown what an antenna or
     a delay is told by, it is the least that white noise can be.
     """
@@ -133,11 +132,11 @@ def felt(asked: Asked, batches: Sequence[Batch]) -> Examination:
     density = spectrum(batches)
     if density is None:
         return sampled
-    tone, fixes = tones(density), sum(len(b.fixes) for b in batches)
-    # Of what not even the best receiver could tell, nothing is asked.
-    if fixes * np.sum((swung(batches, tone) / LIMITS["velocity"][0]) ** 2) > CLEARLY:
-        toneless = asked.examined(expected(batches, density, tone), sampled)
+    tones = unseen(sampled, batches)
+    if tones:
+        toneless = asked.examined(without(batches, tones), sampled)
         if toneless.log_likelihood > sampled.log_likelihood:
+            tone = density_of(tones, density, stretches_of(batches))
             sampled, batches = toneless, toneless.batches
             density = np.maximum(density - tone, np.min(density, axis=0))
     walk = mean_walk_s(sampled.noise, batches)

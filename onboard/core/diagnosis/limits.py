@@ -21,6 +21,13 @@ CLEARLY: Final = 10.0
 """Difference of scores from which one hypothesis is clearly better than another: odds of 150, "very
 strong" on the scale of Kass and Raftery (1995), which is that of BIC: scores differ nearly alike
 [probability]."""
+LEFT_OF_TONE: Final = 25.0
+"""Times the variance that is left of velocities: a filter that follows each fix leaves of a tone
+``2 sin(pi f T)``, which at 0.6 Hz and fifteen fixes a second is a fourth, and a smoothing that is
+found for its sake some more of it [bound]."""
+MOST_TONES: Final = 12
+"""Tones of a flight that are asked about, one pass each [cost: three axes have one of a motor, and
+a flight five speeds of it]."""
 LOST: Final = 0.1
 """Share of its evidence that an effect loses if the signal that it follows is measured and sampled
 with an error of a third of its size: a product must explain as much more to take its place [tuned:

@@ -19,15 +19,11 @@ that what the receiver finds of such a walk is what ``q`` is, but for what an av
 that are fitted make of it.  Which of them it is, and how much, is for the likelihood of what the
 receiver says to decide (:mod:`onboard.core.diagnosis.felt`).
 
-A *tone* is the other kind: a rotor that is governed, or a motor at constant speed, beats at one
-frequency, and sampled more slowly than that it has another one, at which a vehicle may fly.  Its
-samples are no force there either, and ``q`` is what a line of the spectrum has on top of what lies
-beside it.  A vehicle that really swings has such a line, too, and likelihood decides likewise.
+A *tone* is the other kind (:mod:`onboard.core.inputs.tones`).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -39,9 +35,6 @@ from onboard.core.inputs.limits import (
     FLOOR_BINS,
     RESOLVED_S,
     SPECTRUM_BINS,
-    TONE_BESIDE,
-    TONE_BINS,
-    TONE_STANDS_OUT,
 )
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
@@ -55,40 +48,23 @@ def spectrum(batches: Sequence[Batch]) -> Array | None:
 
     None if they are too few to tell.
     """
-    every = list(runs(batches))
-    steps = [np.diff(times(run)) for run in every] or [np.ones(1)]
-    step = float(np.median(np.concatenate(steps)))
+    step = step_of(batches)
     count, found = 0, np.zeros(1)
-    for run in every:
-        for p in _periodograms(joined(run)[1], step):
+    for run in runs(batches):
+        for p in periodograms(joined(run)[1], step):
             count, found = count + 1, found + p
     return found / count if count else None
 
 
+def step_of(batches: Sequence[Batch]) -> float:
+    """Time between samples, s; 1 of no samples."""
+    steps = [np.diff(times(run)) for run in runs(batches)] or [np.ones(1)]
+    return float(np.median(np.concatenate(steps)))
+
+
 def white(density: Array) -> Array:
     """(3,) density that white noise may have at the most, of a spectrum (bins, 3)."""
-    out: Array = _averaged(density, FLOOR_BINS).min(axis=0)
-    return out
-
-
-def tones(density: Array) -> Array:
-    """(bins, 3) density that narrow lines of a spectrum (bins, 3) have on top of what is beside."""
-    there = _averaged(density, SPECTRUM_BINS)
-    out, n = np.zeros_like(there), len(there)
-    # Slower ones have nothing beside them that the window does not smear them into.
-    for i in range(math.ceil(TONE_BINS / (1.0 - 1.0 / TONE_BESIDE)), n):
-        below = there[math.ceil(i / TONE_BESIDE) : i - TONE_BINS + 1].mean(axis=0)
-        above = there[i + TONE_BINS : math.floor(i * TONE_BESIDE) + 1]
-        beside = np.maximum(below, above.mean(axis=0)) if len(above) else below
-        out[i] = np.where(there[i] > TONE_STANDS_OUT * beside, there[i] - beside, 0.0)
-    return out
-
-
-def swung(batches: Sequence[Batch], tone: Array) -> Array:
-    """(3,) m/s, RMS: velocity that tones (bins, 3) of the samples of a flight would be."""
-    step = float(np.median(np.concatenate([np.diff(times(run)) for run in runs(batches)])))
-    f = np.linspace(0.0, 0.5 / step, len(tone))[1:]
-    out: Array = np.sqrt((2.0 * f[0] / (2.0 * np.pi * f) ** 2) @ tone[1:])
+    out: Array = averaged(density, FLOOR_BINS).min(axis=0)
     return out
 
 
@@ -110,7 +86,7 @@ def drowned(batches: Sequence[Batch], density: Array) -> bool:
         return False
     f = np.linspace(0.0, 0.5 / steps, len(density))
     followed = (f > 0.0) & (f <= 0.5 / fixes)
-    there = _averaged(density, SPECTRUM_BINS)[followed]
+    there = averaged(density, SPECTRUM_BINS)[followed]
     share = white(density) / np.where(there > 0.0, there, np.inf)
     return bool(len(share) and np.any(share.mean(axis=0) > DROWNED))
 
@@ -139,7 +115,7 @@ def levelled(batches: Sequence[Batch], density: Array, level: Array) -> list[Bat
         The flight; its segments have what a level e times as high would take off their samples, to
         first order, as a slow signal :data:`TAKEN`, m/s^2, sensor axes.
     """
-    there = _averaged(density, SPECTRUM_BINS)
+    there = averaged(density, SPECTRUM_BINS)
     # Where nothing is left, more noise takes nothing more.
     more = np.divide(level, there, out=np.zeros_like(there), where=level < there)
     more[0] = 0.0  # of the mean
@@ -152,7 +128,7 @@ def levelled(batches: Sequence[Batch], density: Array, level: Array) -> list[Bat
     return [replace(b, segment=made[id(b.segment)]) for b in out]
 
 
-def _periodograms(raw: Array, step: float) -> Iterator[Array]:
+def periodograms(raw: Array, step: float) -> Iterator[Array]:
     """Two-sided densities (bins, 3), (m/s^2)^2 s, of stretches that overlap by half (Welch)."""
     n = 2 * round(RESOLVED_S / step / 2.0)
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
@@ -163,14 +139,14 @@ def _periodograms(raw: Array, step: float) -> Iterator[Array]:
 
 def _gain(density: Array, noise: Array) -> Array:
     """(bins, 3) of the filter."""
-    there = _averaged(density, SPECTRUM_BINS)
+    there = averaged(density, SPECTRUM_BINS)
     share = np.divide(noise, there, out=np.zeros_like(there), where=there > 0.0)
     gain: Array = np.clip(1.0 - share, 0.0, 1.0)
     gain[0] = 1.0  # of the mean
     return gain
 
 
-def _averaged(density: Array, bins: int) -> Array:
+def averaged(density: Array, bins: int) -> Array:
     """The mean over an odd number of bins, at either end of those that there are."""
     padded = np.pad(density, ((bins // 2, bins // 2), (0, 0)), mode="reflect")
     out: Array = np.lib.stride_tricks.sliding_window_view(padded, bins, axis=0).mean(axis=-1)

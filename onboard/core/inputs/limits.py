@@ -166,6 +166,8 @@ TONE_BINS: Final = 4
 TONE_STANDS_OUT: Final = 5.0
 """Times what lies beside it that a tone has.  Of three stretches, the fewest of a flight that is
 judged, one of 1500 frequencies has that by chance once in a thousand flights [probability]."""
+TONE_STRETCHES: Final = 3
+"""Stretches of which a spectrum of a part of a flight is made [probability: as above]."""
 DROWNED: Final = 0.5
 """Share of noise in the force at a frequency of the fixes, in the mean of them, from which it is
 more noise than force [bound]."""

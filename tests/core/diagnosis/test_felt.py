@@ -25,11 +25,21 @@ SHAKE, NOTHING = np.full(3, 0.6), np.zeros(3)
 """Standard deviations of white shaking, body axes, m/s^2."""
 
 
-def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING, calm_s=0.0):
+def shaken(
+    samples,
+    *,
+    noise=NOTHING,
+    real=NOTHING,
+    beat=NOTHING,
+    swing=NOTHING,
+    calm_s=0.0,
+    hz=(1.7, 1.7),
+    until=np.inf,
+):
     """The flight with noise in its samples, and really shaken so that its receiver has it, too.
 
-    Beside both tones of 1.7 Hz: a beat in the samples, and a swing that is real.  All of it by
-    turns with as long a calm.
+    Beside both tones: a beat in the samples, and a swing that is real, each of its own frequency
+    ``until`` they change places.  All of it by turns with as long a calm.
     """
     rng, R_nb, v, made = np.random.default_rng(3), np.eye(3), np.zeros(3), []
     times, speeds, heights = [-np.inf], [v], [0.0]
@@ -38,9 +48,10 @@ def shaken(samples, *, noise=NOTHING, real=NOTHING, beat=NOTHING, swing=NOTHING,
         if isinstance(s, AttitudeSample):
             R_nb = rotation_from_euler(s.roll, s.pitch, s.yaw)
         elif isinstance(s, ImuSample):
-            tone = np.sqrt(2.0) * np.sin(2.0 * np.pi * 1.7 * s.t)
+            of = hz if s.t < until else hz[::-1]
+            tone, swung = (np.sqrt(2.0) * np.sin(2.0 * np.pi * f * s.t) for f in of)
             calm = calm_s > 0.0 and s.t // calm_s % 2
-            a = (real * rng.normal(size=3) + swing * tone) * (not calm)
+            a = (real * rng.normal(size=3) + swing * swung) * (not calm)
             n = (noise * rng.normal(size=3) + beat * tone) * (not calm)
             out = replace(s, f_b=tuple((np.array(s.f_b) + a + n).tolist()))
             v = v + STEP * (R_nb @ a)
@@ -128,6 +139,16 @@ def test_of_a_tone_the_velocity_says_whether_it_is_the_vehicles(flight):
     beat = np.array([0.4, 0.3, 0.0])
     assert changed(shaken(flight, beat=beat)) == pytest.approx(beat, rel=0.1, abs=0.05)
     assert np.all(changed(shaken(flight, swing=beat)) < 0.05)
+
+
+@pytest.mark.slow
+def test_of_each_tone_by_itself_the_velocity_says_whether_it_is_the_vehicles(flight):
+    """A motor changes its speed in the middle of the flight, and a swing is then where it was."""
+    beat, swing = np.array([0.4, 0.0, 0.0]), np.array([0.0, 0.4, 0.0])
+    half = float(np.mean([s.t for s in flight if isinstance(s, ImuSample)]))
+    taken = changed(shaken(flight, beat=beat, swing=swing, hz=(1.7, 2.6), until=half))
+    assert taken[0] == pytest.approx(beat[0], rel=0.2)
+    assert taken[1] < 0.1 * swing[1]
 
 
 @pytest.mark.slow

@@ -11,8 +11,6 @@ from onboard.core.inputs.expected_force import (
     expected,
     levelled,
     spectrum,
-    swung,
-    tones,
     white,
 )
 from onboard.core.inputs.segments import Batch, Fixes, Segment
@@ -143,36 +141,6 @@ def test_a_tone_is_no_white_noise():
     got = felt(of_noise(batches(f + tone + noise)))
     smooth = [np.convolve(x[:, 0], np.ones(50) / 50.0, "valid") for x in (got, f)]
     assert np.std(smooth[0] - smooth[1]) < 0.05
-
-
-@pytest.mark.parametrize("hz", [1.4, 2.65, 11.0])
-def test_a_tone_that_is_asked_for_goes_and_the_manoeuvre_stays(hz):
-    """A beat of 52 Hz is one of 2 Hz in samples at 25 Hz, where a vehicle swings as well."""
-    f = manoeuvre()
-    beat = 0.3 * np.sin(2.0 * np.pi * hz * T + 0.4)[:, None] * [1.0, 0.0, -0.5]
-    flight = batches(f + beat + 0.01 * np.random.default_rng(7).normal(size=f.shape))
-    density = spectrum(flight)
-    line = tones(density)
-    lines = np.flatnonzero(line[:, 0]) * 0.5 / STEP / (len(density) - 1)
-    assert len(lines)
-    assert lines == pytest.approx(hz, abs=0.25)
-    assert not line[:, 1].any()
-    # What is in the window's skirts is left.
-    velocity = beat.std(axis=0) / (2.0 * np.pi * hz)
-    assert swung(flight, line) == pytest.approx(velocity, rel=0.1, abs=1e-9)
-    left = (felt(expected(flight, density, line)) - f)[500:-500]
-    assert np.all(left.std(axis=0)[[0, 2]] < 0.2 * beat[500:-500].std(axis=0)[[0, 2]])
-    assert left[:, 1].std() < 0.02
-
-
-def test_what_swings_with_a_damping_of_its_own_is_no_tone():
-    """A pitch mode, damped by a fifth of the critical, shaken by white noise; and a manoeuvre."""
-    for seed in range(20):
-        assert not tones(spectrum(batches(manoeuvre(seed)))).any()
-    shaking = np.random.default_rng(8).normal(size=(len(T), 3))
-    r = np.fft.rfftfreq(len(T), STEP)[:, None] / 1.2
-    mode = np.fft.irfft(np.fft.rfft(shaking, axis=0) / (1.0 - r**2 + 0.4j * r), len(T), axis=0)
-    assert not tones(spectrum(batches(manoeuvre() + 0.2 * mode))).any()
 
 
 @pytest.mark.parametrize("gap", [(), (3,), (3, 4)])
