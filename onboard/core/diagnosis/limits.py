@@ -26,7 +26,7 @@ LEFT_OF_TONE: Final = 25.0
 ``2 sin(pi f T)``, which at 0.6 Hz and fifteen fixes a second is a fourth, and a smoothing that is
 found for its sake some more of it [bound]."""
 MOST_TONES: Final = 12
-"""Tones of a flight that are asked about, one pass each [cost: three axes have one of a motor, and
+"""Tones of a flight that are asked about, a column each [cost: three axes have one of a motor, and
 a flight five speeds of it]."""
 LOST: Final = 0.1
 """Share of its evidence that an effect loses if the signal that it follows is measured and sampled

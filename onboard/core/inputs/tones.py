@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -34,6 +34,9 @@ from onboard.core.inputs.limits import (
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
+PARTS = "tones"
+"""The slow signal of what tones have of the samples."""
+
 
 @dataclass(frozen=True, slots=True)
 class Line:
@@ -47,6 +50,12 @@ class Line:
     def bins(self) -> slice:
         """Those that it has."""
         return slice(self.first, self.first + len(self.density))
+
+    def dense(self, bins: int) -> Array:
+        """(bins,) its share."""
+        out = np.zeros(bins)
+        out[self.bins] = self.share
+        return out
 
 
 class Kind(IntEnum):
@@ -133,12 +142,35 @@ def without(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
 
     def changed(_: Array, raw: Array) -> Array:
         nonlocal first
-        count = max(len(raw) // half - 1, 0)
-        here = range(first, first + max(count, 1))
-        first += count
-        return _filtered(raw, half, [shares.get(k) for k in here])
+        here = _stretches_in(raw, half, first)
+        first = here.stop
+        parts = [
+            [(a, a, s) for a, s in enumerate(shares[k].T)] if k in shares else [] for k in here
+        ]
+        return raw - _taken(raw, half, parts, 3) if any(parts) else raw
 
     return with_samples(batches, changed)
+
+
+def with_parts(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
+    """The same flight with what each tone has of the samples as a slow signal :data:`PARTS`.
+
+    Its columns are the tones, m/s^2 along the axis of each.
+    """
+    half = _samples(step_of(batches)) // 2
+    first, made = 0, {}
+    for run in runs(batches):
+        t, raw = joined(run)
+        here = _stretches_in(raw, half, first)
+        first = here.stop
+        parts = [
+            [(i, x.axis, x.lines[k].dense(half + 1)) for i, x in enumerate(tones) if k in x.lines]
+            for k in here
+        ]
+        signal = t, _taken(raw, half, parts, len(tones))
+        for s in (batch.segment for batch in run):
+            made[id(s)] = s.with_slow(s.slow | {PARTS: signal})
+    return [replace(b, segment=made[id(b.segment)]) for b in batches]
 
 
 def density_of(tones: Sequence[Tone], density: Array, count: int) -> Array:
@@ -227,27 +259,38 @@ def _shares(tones: Sequence[Tone], bins: int) -> dict[int, Array]:
     return out
 
 
-def _filtered(raw: Array, half: int, shares: Sequence[Array | None]) -> Array:
-    """Samples (n, 3) without a share of each stretch, faded from one to the next.
+def _stretches_in(raw: Array, half: int, first: int) -> range:
+    """Which stretches of the flight, from ``first`` on, the samples of a run are."""
+    return range(first, first + max(len(raw) // half - 1, 1))
+
+
+def _taken(
+    raw: Array, half: int, parts: Sequence[Sequence[tuple[int, int, Array]]], columns: int
+) -> Array:
+    """(n, columns) shares of each stretch of samples (n, 3), faded from one to the next.
 
     What is filtered is as long again before and after, so that nothing comes in from the far end.
+
+    Args:
+        raw: the samples.
+        half: of a stretch, samples.
+        parts: of each stretch: the column, of which axis it is, and its share (half + 1,) by bin.
+        columns: how many.
     """
-    if all(share is None for share in shares):
-        return raw
     n, count = 2 * half, len(raw)
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
-    out = np.zeros((count + 4 * n, 3))
+    out = np.zeros((count + 4 * n, columns))
     longer = np.pad(raw, ((n, 2 * n), (0, 0)), mode="reflect" if count > 1 else "edge")
     for j in range(-1, math.ceil(count / half)):
-        share = shares[min(max(j, 0), len(shares) - 1)]
-        if share is None:
+        here = parts[min(max(j, 0), len(parts) - 1)]
+        if not here:
             continue
         piece = longer[n + j * half : 2 * n + j * half]
         spectrum = np.fft.rfft(
             np.pad((piece - piece.mean(axis=0)) * window, ((half, half), (0, 0))), axis=0
         )
         at = np.arange(len(spectrum)) / 2.0
-        spectrum *= np.stack([np.interp(at, np.arange(len(share)), s) for s in share.T], axis=-1)
-        out[n + j * half : 3 * n + j * half] += np.fft.irfft(spectrum, 2 * n, axis=0)
-    taken: Array = out[n + half : n + half + count]
-    return raw - taken
+        for column, axis, share in here:
+            kept = spectrum[:, axis] * np.interp(at, np.arange(len(share)), share)
+            out[n + j * half : 3 * n + j * half, column] += np.fft.irfft(kept, 2 * n)
+    return out[n + half : n + half + count]
