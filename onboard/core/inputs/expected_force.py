@@ -124,7 +124,7 @@ def levelled(batches: Sequence[Batch], density: Array, level: Array) -> list[Bat
         t, raw = joined(run)
         taken = _filtered(raw - raw.mean(axis=0), more)
         for s in (batch.segment for batch in felt):
-            made[id(s)] = s.with_slow(s.slow | {TAKEN: (t, taken)})
+            made[id(s)] = s.with_slow(s.slow | {TAKEN: (s.t, taken[np.searchsorted(t, s.t)])})
     return [replace(b, segment=made[id(b.segment)]) for b in out]
 
 

@@ -167,9 +167,9 @@ def with_parts(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
             [(i, x.axis, x.lines[k].dense(half + 1)) for i, x in enumerate(tones) if k in x.lines]
             for k in here
         ]
-        signal = t, _taken(raw, half, parts, len(tones))
+        taken = _taken(raw, half, parts, len(tones))
         for s in (batch.segment for batch in run):
-            made[id(s)] = s.with_slow(s.slow | {PARTS: signal})
+            made[id(s)] = s.with_slow(s.slow | {PARTS: (s.t, taken[np.searchsorted(t, s.t)])})
     return [replace(b, segment=made[id(b.segment)]) for b in batches]
 
 
