@@ -25,11 +25,10 @@ A *tone* is the other kind (:mod:`onboard.core.inputs.tones`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from onboard.core.inputs.joined import joined, runs, times, with_samples
+from onboard.core.inputs.joined import joined, runs, times, with_samples, with_signal
 from onboard.core.inputs.limits import (
     DROWNED,
     FLOOR_BINS,
@@ -119,13 +118,8 @@ def levelled(batches: Sequence[Batch], density: Array, level: Array) -> list[Bat
     # Where nothing is left, more noise takes nothing more.
     more = np.divide(level, there, out=np.zeros_like(there), where=level < there)
     more[0] = 0.0  # of the mean
-    out, made = expected(batches, density, np.minimum(there, level)), {}
-    for run, felt in zip(runs(batches), runs(out), strict=True):
-        t, raw = joined(run)
-        taken = _filtered(raw - raw.mean(axis=0), more)
-        for s in (batch.segment for batch in felt):
-            made[id(s)] = s.with_slow(s.slow | {TAKEN: (s.t, taken[np.searchsorted(t, s.t)])})
-    return [replace(b, segment=made[id(b.segment)]) for b in out]
+    doubted = with_signal(batches, TAKEN, lambda raw: _filtered(raw - raw.mean(axis=0), more))
+    return expected(doubted, density, np.minimum(there, level))
 
 
 def periodograms(raw: Array, step: float) -> Iterator[Array]:

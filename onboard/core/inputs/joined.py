@@ -32,6 +32,26 @@ def with_samples(batches: Sequence[Batch], changed: Callable[[Array, Array], Arr
     ]
 
 
+def with_signal(
+    batches: Sequence[Batch], name: str, made_of: Callable[[Array], Array]
+) -> list[Batch]:
+    """The same flight with a slow signal that is made of its samples.
+
+    Args:
+        batches: the flight.
+        name: of the signal.
+        made_of: raw force (n, 3) of samples that follow on each other, to the signal (n, k).
+    """
+    made: dict[int, Segment] = {}
+    for run in runs(batches):
+        t, raw = joined(run)
+        signal = made_of(raw)
+        for s in (batch.segment for batch in run):
+            # Of each segment by itself: all of a day would be looked through for each.
+            made[id(s)] = s.with_slow(s.slow | {name: (s.t, signal[np.searchsorted(t, s.t)])})
+    return [replace(b, segment=made[id(b.segment)]) for b in batches]
+
+
 def runs(batches: Sequence[Batch]) -> Iterator[list[Batch]]:
     """Batches whose samples follow on each other."""
     run: list[Batch] = []

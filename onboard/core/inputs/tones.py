@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
 
 from onboard.core.inputs.expected_force import averaged, periodograms, step_of
-from onboard.core.inputs.joined import joined, runs, with_samples
+from onboard.core.inputs.joined import joined, runs, with_samples, with_signal
 from onboard.core.inputs.limits import (
     RESOLVED_S,
     SPECTRUM_BINS,
@@ -59,7 +59,10 @@ class Line:
 
 
 class Kind(IntEnum):
-    """Of a tone: of a part of the flight, of all of it, or of a part and not quite steady."""
+    """Of a tone: of a part of the flight, of all of it, or of a part and not quite steady.
+
+    They are asked about in this order, and the numbers mean nothing else.
+    """
 
     PART = 0
     WHOLE = 1
@@ -143,7 +146,7 @@ def without(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
     def changed(_: Array, raw: Array) -> Array:
         nonlocal first
         here = _stretches_in(raw, half, first)
-        first = here.stop
+        first += _count(raw, half)
         parts = [
             [(a, a, s) for a, s in enumerate(shares[k].T)] if k in shares else [] for k in here
         ]
@@ -158,19 +161,19 @@ def with_parts(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
     Its columns are the tones, m/s^2 along the axis of each.
     """
     half = _samples(step_of(batches)) // 2
-    first, made = 0, {}
-    for run in runs(batches):
-        t, raw = joined(run)
+    first = 0
+
+    def made_of(raw: Array) -> Array:
+        nonlocal first
         here = _stretches_in(raw, half, first)
-        first = here.stop
+        first += _count(raw, half)
         parts = [
             [(i, x.axis, x.lines[k].dense(half + 1)) for i, x in enumerate(tones) if k in x.lines]
             for k in here
         ]
-        taken = _taken(raw, half, parts, len(tones))
-        for s in (batch.segment for batch in run):
-            made[id(s)] = s.with_slow(s.slow | {PARTS: (s.t, taken[np.searchsorted(t, s.t)])})
-    return [replace(b, segment=made[id(b.segment)]) for b in batches]
+        return _taken(raw, half, parts, len(tones))
+
+    return with_signal(batches, PARTS, made_of)
 
 
 def density_of(tones: Sequence[Tone], density: Array, count: int) -> Array:
@@ -259,9 +262,14 @@ def _shares(tones: Sequence[Tone], bins: int) -> dict[int, Array]:
     return out
 
 
+def _count(raw: Array, half: int) -> int:
+    """How many stretches the samples of a run have; too few samples have none."""
+    return max(len(raw) // half - 1, 0)
+
+
 def _stretches_in(raw: Array, half: int, first: int) -> range:
-    """Which stretches of the flight, from ``first`` on, the samples of a run are."""
-    return range(first, first + max(len(raw) // half - 1, 1))
+    """Which stretches of the flight the samples of a run are; or else the next one is nearest."""
+    return range(first, first + max(_count(raw, half), 1))
 
 
 def _taken(

@@ -7,11 +7,13 @@ import pytest
 
 from onboard.core.inputs.expected_force import spectrum
 from onboard.core.inputs.tones import (
+    PARTS,
     Kind,
     density_of,
     stretches_of,
     tones,
     tones_of,
+    with_parts,
     without,
 )
 from tests.core.inputs.test_expected_force import STEP, T, batches, felt, manoeuvre
@@ -122,6 +124,20 @@ def test_segments_that_overlap_have_the_same_force_where_they_do(gap):
         both, i, j = np.intersect1d(a.segment.t, b.segment.t, return_indices=True)
         np.testing.assert_array_equal(a.segment.raw_s[i], b.segment.raw_s[j])
         assert len(both) or b.fresh
+
+
+def test_flight_too_short_for_a_stretch_is_none():
+    """Eight seconds before a gap: what follows has its tones where it had them without these."""
+    lasts = (T > 60.0) & (T < 160.0)
+    flight = batches(manoeuvre() + beat(2.3)[:, None] * lasts[:, None] + FAINT, 30, gap=(1,))
+    found = tones_of(flight)
+    assert found
+    assert [x.lines.keys() for x in found] == [x.lines.keys() for x in tones_of(flight[1:])]
+    for changed in (with_parts, without):
+        for a, b in zip(changed(flight, found)[1:], changed(flight[1:], found), strict=True):
+            assert np.array_equal(a.segment.raw_s, b.segment.raw_s)
+            if changed is with_parts:
+                assert np.array_equal(a.segment.slow[PARTS][1], b.segment.slow[PARTS][1])
 
 
 def test_a_flight_too_short_for_a_spectrum_has_no_tones():
