@@ -115,7 +115,7 @@ def _after(judge: Judge, first: Numbers, value: Array, flight: Flight) -> Iterat
         return
     solution = judge.final.solution
     at = judge.engine.indices(families[0])
-    size, places = solution.theta[at], [*range(6), *at]
+    size, places = judge.engine.model.whole(solution.theta)[at], [*range(6), *at]
     # What is read too much is taken off, as beta is added.
     later = linear_of(value) - np.concatenate([np.zeros(3), size])
     G = parameters_jacobian(later) @ np.hstack([np.eye(6), -np.eye(6)[:, 3:]])

@@ -48,4 +48,4 @@ def beside(engine: Examination, faster_m_s: float, until: float) -> Beside:
     six[:, engine.model.slices[SIX]] = A[:, engine.model.slices[SIX]]
     solution = engine.found()
     C = solution.covariance
-    return Beside((A - six) @ solution.theta, A @ C @ A.T - six @ C @ six.T)
+    return Beside((A - six) @ engine.model.whole(solution.theta), A @ C @ A.T - six @ C @ six.T)

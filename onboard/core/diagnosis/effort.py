@@ -21,6 +21,8 @@ SEARCHED: Final = 0.1
 that is found with it in the model."""
 SPACINGS_S: Final = (2.0, 0.5)
 """Spacing of the two rounds of a search, s: the likelihood bends over a second."""
+FINER: Final = 4
+"""Times that moments are closer in a next round, where the likelihood bends between them."""
 FURTHEST: Final = 3
 """Times that a search goes on beyond its edge."""
 ONCE_MORE: Final = 12

@@ -216,7 +216,8 @@ class Judge:
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, (
                 "what was found may stand for something that is not in the model. " + note
             )
-        if excess := excess_in_words(self.engine.noise):
+        misled = any(f.misleads_ekf for f in self.final.families)
+        if excess := excess_in_words(self.engine.noise, misled=misled):
             note = f"{excess} {note}"
         if spoils(self.engine.noise):
             return Verdict.PARTLY_EXPLAINED if effects else Verdict.UNEXPLAINED, note

@@ -88,13 +88,24 @@ class Examination(Engine):
             more=(*families, *self.carried, *answers),
         )
         self._refused_by: Engine | None = like
-        self.batches = list(like.batches if batches is None else batches)
+        if batches is None:
+            batches = like.as_read if isinstance(like, Examination) else like.batches
+        self.as_read: list[Batch] = list(batches)
         for answer in answers:
-            self.batches = answer.along(self.batches)
+            self.as_read = answer.along(self.as_read)
+        self.batches = self._without_jumps()
         self.trusted_s = sum(c.trusted_s for c in self.batches)
         self.left_brisk_s = like.left_brisk_s
         self.sample = _sampled(self.batches)
         self._seed = self._known_to(origin)
+
+    def _without_jumps(self) -> list[Batch]:
+        """The flight as it was read, less what is known of jumps of the offset."""
+        out, scale = self.as_read, np.array(self.point.scale)
+        for jump in _jumps((*self.families, *self.carried)):
+            if jump.taken_off is not None:
+                out = [replace(b, segment=jump.off_samples(b.segment, scale)) for b in out]
+        return out
 
     def _known_to(self, origin: Engine) -> Solution | None:
         """What another engine knows, as a solution of this one's model: gates begin with it.
@@ -283,7 +294,7 @@ class Examination(Engine):
     @property
     def absent(self) -> Array:
         """Values of the unknowns that mean that an effect is not in the model, (m,)."""
-        at = np.zeros(self.model.size)
+        at = -self.model.taken_off
         if "clock_rate" in self.model.index:
             at[self.model.index["clock_rate"]] = -self.point.skew
         return at
@@ -313,11 +324,17 @@ def _answers(families: Sequence[Family], most: float) -> tuple[EkfJumped, ...]:
 
     Its accelerometer has jumped by no more than is known of the jump, or offsets are, m/s^2.
     """
-    jumps = [f for f in families if isinstance(f, BiasStep) and f.onset is not None]
-    sizes = {
-        f.moment: np.array([np.hypot(u.prior, u.prior_sigma) for u in f.unknowns]) for f in jumps
-    }
+    sizes = {}
+    for f in _jumps(families):
+        seen, sigma = np.array([(u.prior, u.prior_sigma) for u in f.unknowns]).T
+        taken = 0.0 if f.taken_off is None else f.taken_off
+        sizes[f.moment] = np.hypot(seen + taken, sigma)
     return tuple(EkfJumped(at, np.minimum(sizes[at], most)) for at in sorted(sizes))
+
+
+def _jumps(families: Sequence[Family]) -> list[BiasStep]:
+    """Jumps of the offset whose moments are known."""
+    return [f for f in families if isinstance(f, BiasStep) and f.onset is not None]
 
 
 def _sampled(batches: Sequence[Batch]) -> list[list[Batch]]:

@@ -40,9 +40,16 @@ WORDS: Final = {
 """What a level at its highest says."""
 
 
-def excess_in_words(noise: NoiseLevels) -> str:
-    """What is no noise any more, one sentence; empty if all is."""
-    said = list(dict.fromkeys(WORDS[name] for name in noise.at_highest))
+def excess_in_words(noise: NoiseLevels, *, misled: bool = False) -> str:
+    """What is no noise any more, one sentence; empty if all is.
+
+    Args:
+        noise: levels.
+        misled: whether the accelerometer is known to have misled the recorded attitude by more than
+            a state estimate makes up for: what the gyroscope says otherwise is then that.
+    """
+    words = {**WORDS, **{k: TILT for k, said in WORDS.items() if said == GYROSCOPE and misled}}
+    said = list(dict.fromkeys(words[name] for name in noise.at_highest))
     return f"{', and '.join(said)}." if said else ""
 
 

@@ -17,7 +17,7 @@ from onboard.core.maths.arrays import Array
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.physics.catalogue import response_of
 from onboard.core.physics.effect import Cure, Effect
-from onboard.core.physics.effects.bias_step import SHARED_CURE
+from onboard.core.physics.effects.bias_step import SHARED_CURE, SWITCHED_CURE, BiasStep
 from onboard.core.physics.finding import Confounder, Finding, Quantity
 
 
@@ -87,12 +87,11 @@ class Findings:
         final = self._final
         index = [i for i in final.all if i in final.engine.indices(f)]
         sigma = np.sqrt(np.diag(final.solution.covariance))
-        taken = {"clock_rate": final.engine.point.skew}
+        held = final.engine.absent
+        sizes = final.solution.theta - held
         # The sizes come first; there are no keys for the shapes after them.
         quantities = {
-            key: Quantity(
-                float(final.solution.theta[i]) + taken.get(u.name, 0.0), float(sigma[i]), u.unit
-            )
+            key: Quantity(float(sizes[i]), float(sigma[i]), u.unit)
             for key, i, u in zip(f.keys, index, f.unknowns, strict=False)
         }
         if f.onset is not None:
@@ -101,9 +100,7 @@ class Findings:
                 **quantities,
             }
         values = {k: q.value for k, q in quantities.items()}
-        held = final.engine.absent
-        common = self._choice.common
-        cure = f.cured(values) if common is None or f.onset != common.onset else SHARED_CURE
+        cure = self._cure(f, values)
         made = self._record(final, f.effect, quantities, index, held, cure)
         made = replace(
             made,
@@ -117,8 +114,18 @@ class Findings:
         if f.onset is None:
             return made
         span = ((f.onset - final.origin.t0, final.engine.blocks[-1].end - final.origin.t0),)
-        axis = main_axis(final.solution.theta[index])
+        axis = main_axis(sizes[index])
         return replace(made, where=spans(final.engine.batches, final.origin.t0, span, axis))
+
+    def _cure(self, f: Effect, values: Mapping[str, float]) -> Cure:
+        """What to do about it, by its sizes, and by what happened to the vehicle just then."""
+        parameters, common = self._final.parameters, self._choice.common
+        if isinstance(f, BiasStep) and parameters.switched_at(
+            self._final.origin.imu, f.moment, f.onset_sigma
+        ):
+            return SWITCHED_CURE
+        shared = common is not None and f.onset == common.onset
+        return SHARED_CURE if shared else f.cured(values)
 
     def _confounders(self, f: Effect) -> tuple[Confounder, ...]:
         for c in self._choice.chosen:

@@ -6,15 +6,23 @@ attitude a kick that dead reckoning knows nothing of; with little flight after i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from onboard.core.diagnosis.block_jumps import settled_from
 from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.companions import Companions
-from onboard.core.diagnosis.effort import FORGOTTEN_S, FURTHEST, MOST_AT_ONCE, ONCE_MORE, SPACINGS_S
+from onboard.core.diagnosis.effort import (
+    FINER,
+    FORGOTTEN_S,
+    FURTHEST,
+    MOST_AT_ONCE,
+    ONCE_MORE,
+    SPACINGS_S,
+)
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import (
     CLEARLY,
@@ -24,7 +32,7 @@ from onboard.core.diagnosis.limits import (
     SCAN_S,
 )
 from onboard.core.diagnosis.onsets import fitted, gains
-from onboard.core.diagnosis.score import least, needed, surprise, time_sigma
+from onboard.core.diagnosis.score import Peak, least, needed, surprise
 from onboard.core.diagnosis.shocks import Shock
 from onboard.core.diagnosis.stepped import Stepped
 from onboard.core.estimate.pool import Pool
@@ -104,13 +112,27 @@ def jump_near(full: Examination, chosen: Sequence[Effect], centre: float, reach:
             flight may have another one further off.
     """
     coarse, fine = SPACINGS_S
+    jump = BiasStep(Origin(full.point.skew_from))
+    first = settled_from(full.blocks)
+
+    def like(t: Array) -> Array:
+        return _scaled(full, chosen, [jump.at(float(x)) for x in t])
+
+    def about(centre: float, width: float, spacing: float) -> Array:
+        times = np.arange(centre - width, centre + width + 1e-6, spacing)
+        inside: Array = np.unique(np.maximum(times, first))
+        return inside
+
     for _ in range(FURTHEST):
-        best = _best(full, chosen, centre, coarse, reach)
-        at_edge = abs(best.moment - centre) > reach - 2.0 * coarse
-        centre = best.moment
+        t = about(centre, reach, coarse)
+        peak = Peak(t, like(t), coarse)
+        at_edge = abs(peak.best - centre) > reach - 2.0 * coarse
+        centre = peak.best
         if not at_edge:
             break
-    return _best(full, chosen, centre, fine, 1.5 * coarse)
+    t = about(centre, 1.5 * coarse, fine)
+    peak = _resolved(full, like, peak.closer(t, like(t), fine))
+    return jump.at(peak.best, None, peak.sigma)
 
 
 def placed(full: Examination, seen: BiasStep) -> BiasStep:
@@ -124,8 +146,28 @@ def placed(full: Examination, seen: BiasStep) -> BiasStep:
     like = _liked(full, seen, t)
     near = t[like > like.max() - CLEARLY]
     t = _moments(full, near[0] - coarse, near[-1] + coarse, fine)
-    like = _liked(full, seen, t)
-    return seen.at(float(t[np.argmax(like)]), sigma=time_sigma(t, like, fine))
+    liked = partial(_liked, full, seen)
+    peak = _resolved(full, liked, Peak(t, liked(t), fine))
+    return seen.at(peak.best, None, peak.sigma)
+
+
+def _resolved(full: Examination, like: Callable[[Array], Array], peak: Peak) -> Peak:
+    """A peak that was looked at ever closer, until moments are closer than it is wide.
+
+    Where neighbours are no likelier than chance, they are too far apart to tell how well a moment
+    is known.  Between two samples nothing is told.
+
+    Args:
+        full: the flight.
+        like: chi-square (n,) that speaks for moments (n,), s.
+        peak: what is known of it.
+    """
+    sample = float(np.median(np.diff(full.batches[0].segment.t)))
+    while peak.sigma < peak.spacing and peak.spacing > sample:
+        closer = peak.spacing / FINER
+        t = peak.best + closer * np.arange(1 - FINER, FINER, dtype=np.float64)
+        peak = peak.closer(t, like(t), closer)
+    return peak
 
 
 def _moments(full: Examination, first: float, last: float, spacing: float) -> Array:
@@ -189,21 +231,6 @@ def explains(full: Examination, chosen: Sequence[Effect], shock: Shock) -> bool:
     """Whether what a shock explains beside ``chosen`` effects is no chance at all its moments."""
     (gain,) = gains(full, chosen, [shock])
     return surprise(gain, len(shock.unknowns), full.trusted_s / SPACINGS_S[-1]) >= least()
-
-
-def _best(
-    full: Examination,
-    chosen: Sequence[Effect],
-    centre: float,
-    spacing: float,
-    width: float,
-) -> BiasStep:
-    jump = BiasStep(Origin(full.point.skew_from))
-    times = np.arange(centre - width, centre + width + 1e-6, spacing)
-    times = np.maximum(times, settled_from(full.blocks))
-    times = np.unique(times)
-    gain = _scaled(full, chosen, [jump.at(float(t)) for t in times])
-    return jump.at(float(times[np.argmax(gain)]), sigma=time_sigma(times, gain, spacing))
 
 
 def _scaled(full: Examination, chosen: Sequence[Effect], jumps: Sequence[BiasStep]) -> Array:

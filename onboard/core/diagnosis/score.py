@@ -57,6 +57,53 @@ def needed(
     return max(variance, 1.0) * _certain(unknowns, -0.5 * least() - log(places))
 
 
+class Peak:
+    """A likelihood over moments, looked at closer where it is highest.
+
+    Attributes:
+        t: (n,) moments, s.
+        gain: (n,) fall of chi-square at each.
+        width: (n,) s for which each stands.
+    """
+
+    def __init__(self, t: Array, gain: Array, width: float | Array) -> None:
+        """Take the moments."""
+        self.t, self.gain = t, gain
+        self.width: Array = np.broadcast_to(np.asarray(width, dtype=np.float64), t.shape)
+
+    @property
+    def best(self) -> float:
+        """The likeliest moment, s."""
+        return float(self.t[np.argmax(self.gain)])
+
+    @property
+    def spacing(self) -> float:
+        """Between the closest of them, s."""
+        return float(self.width.min())
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the moment, s: of its posterior over all that were looked at."""
+        weight = np.exp(0.5 * (self.gain - self.gain.max())) * self.width
+        mean = np.average(self.t, weights=weight)
+        spread = np.average((self.t - mean) ** 2, weights=weight)
+        return float(np.sqrt(spread + self.spacing**2 / 12.0))
+
+    def closer(self, t: Array, gain: Array, spacing: float) -> Peak:
+        """With closer moments about the best one in the place of those among them.
+
+        What is left of the flight when it is gone through is not quite the same each time, so all
+        are counted from the best one, which is among both.
+        """
+        more = gain[np.argmin(np.abs(t - self.best))] - self.gain.max()
+        far = (self.t < t.min() - 0.5 * spacing) | (self.t > t.max() + 0.5 * spacing)
+        return Peak(
+            np.concatenate([self.t[far], t]),
+            np.concatenate([self.gain[far] + more, gain]),
+            np.concatenate([self.width[far], np.full(len(t), spacing)]),
+        )
+
+
 def time_sigma(t: Array, gain: Array, spacing: float) -> float:
     """Standard deviation of a moment, s: of its posterior over those that were looked at.
 
@@ -65,9 +112,7 @@ def time_sigma(t: Array, gain: Array, spacing: float) -> float:
         gain: (n,) fall of chi-square by a jump at each, over its variance.
         spacing: s between them; within it, it may be anywhere.
     """
-    weight = np.exp(0.5 * (gain - gain.max()))
-    mean = np.average(t, weights=weight)
-    return float(np.sqrt(np.average((t - mean) ** 2, weights=weight) + spacing**2 / 12.0))
+    return Peak(t, gain, spacing).sigma
 
 
 def least() -> float:

@@ -24,9 +24,13 @@ def settled(
     jumped = any(f.onset is not None for f in families)
     # Sizes that were chosen about nothing are not yet those that a jump, or a shape, leaves.
     if (jumped and any(f.in_proportion for f in families)) or any(f.shaped for f in families):
-        found = final.found().theta
+        found = final.found().theta - final.absent
         families = _about_sizes([(f, found[final.indices(f)]) for f in families])
         final = _again(full, families, final).with_rows()
+    if any(f.taken_off is not None for f in families):
+        # Noise that was found with a jump in the force is that of a bent flight, as are gates.
+        t0 = full.point.skew_from
+        final = Examination(full, families, t0=t0, start=final).with_noise()
     # A jump may have passed for something slower, or the other way round.
     final, families = _pruned(full, families, final)
     wider = families if named_only else searched(final, families)
@@ -65,7 +69,7 @@ def _pruned(
 
 def families_of(choice: Choice) -> list[Effect]:
     """Columns of what was chosen; those of a gain about its size."""
-    theta = choice.fitter.fit(choice.free, held_out=False).theta
+    theta = choice.fitter.fit(choice.free, held_out=False).theta - choice.fitter.absent
     sized = [(c.columns, theta[list(c.index)]) for c in choice.chosen if c.columns is not None]
     return _about_sizes(sized)
 
@@ -74,9 +78,14 @@ def _about_sizes(sized: Sequence[tuple[Effect, Array]]) -> list[Effect]:
     """Effects of which those in proportion to the force act on the force without the others."""
     alone = [(f.about(size, ()), size) for f, size in sized]
     return [
-        f.about(size, [a for j, a in enumerate(alone) if j != i and a[0].changes_force])
+        f.about(size, [a for j, a in enumerate(alone) if j != i and _bends(a[0])])
         for i, (f, size) in enumerate(alone)
     ]
+
+
+def _bends(f: Effect) -> bool:
+    """Whether samples have a force that it has changed."""
+    return f.changes_force and f.taken_off is None
 
 
 def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Examination:
@@ -98,12 +107,13 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
 
 def _again(full: Examination, families: Sequence[Effect], final: Examination) -> Examination:
     """Another model than the final one, from where that one has come to."""
+    judged = final if any(f.taken_off is not None for f in families) else full
     return Examination(
         full,
         families,
         t0=full.point.skew_from,
         start=final,
-        refused=full.refused_velocities(),
+        refused=judged.refused_velocities(),
     )
 
 

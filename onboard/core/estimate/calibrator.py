@@ -311,7 +311,7 @@ class Calibrator:
             self._counts["another_sensor"] += 1
         imu = OF_ACCELEROMETER.get(parameter.name)
         unknown = imu is not None and not self.parameters.known(imu)
-        self.parameters.set(parameter.name, parameter.value)
+        self.parameters.set(parameter.name, parameter.value, self._clock.newest)
         if "POS" in parameter.name:  # GPS1_POS_X, GPS_POS1_X, INS_POS1_X
             self._engines.tell_antenna()
         if imu is None or not unknown or not self.parameters.known(imu):

@@ -130,7 +130,7 @@ def in_the_mean(made: Calibration, engine: Engine) -> Calibration:
     T[:, model.slices[SIX]] = np.eye(6)
     plain = T @ solution.covariance @ T.T
     T[3:] += columns
-    linear[3:] += columns @ solution.theta
+    linear[3:] += columns @ model.whole(solution.theta)
     covariance = T @ solution.covariance @ T.T
     # What its sigmas have beyond the sums (floors, axes, what is open) stays as it is.
     J = parameters_jacobian(solution.theta)

@@ -26,7 +26,7 @@ class Misread:
 
     Attributes:
         model: whose families it is of.
-        theta: (m,) its unknowns.
+        theta: (m,) its unknowns, of samples as they were read.
     """
 
     model: Model
@@ -74,4 +74,4 @@ def attitude_error(engine: Engine) -> tuple[Array, Array] | None:
 def misread_of(engine: Engine) -> Misread | None:
     """What an engine's sums say of it; None where there are none."""
     solution = engine.solution()
-    return None if solution is None else Misread(engine.model, solution.theta)
+    return None if solution is None else Misread(engine.model, engine.model.whole(solution.theta))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from math import inf
 from typing import Final
 
 import numpy as np
@@ -45,6 +46,12 @@ HELD: Final = {
 """Of what is asked here; all else (the six, filters, trims, places, delays) it reads anew every
 time, also where its documentation asks for a reboot."""
 
+CORRECTIONS: Final = {f"{parameter_names(imu).correction}ENABLE": imu for imu in range(1, 6)}
+"""What switches an accelerometer's correction for temperature, which is read anew every time."""
+REPORTED_S: Final = 2.0
+"""s between what a parameter does and its report: a slow link sends it when there is room
+[bound]."""
+
 
 def filter_delay(cutoff_hz: float) -> float:
     """Delay (s) of ArduPilot's two-pole Butterworth low-pass well below its cut-off.
@@ -70,13 +77,17 @@ class ParametersInForce:
     """As the autopilot says; None if it has not."""
     waiting: dict[str, float] = field(default_factory=dict)
     """What was reported and is not applied yet."""
+    switched: dict[int, list[float]] = field(default_factory=dict)
+    """When the correction of an accelerometer for temperature was switched, s on the boot clock."""
     _known: set[str] = field(default_factory=set)
     """Of :data:`HELD`, what was reported since the boot."""
     _sixes: dict[int, SixParameters] = field(default_factory=dict)
     """By accelerometer, until another report: every inertial sample asks."""
 
-    def set(self, name: str, value: float) -> None:
-        """Take a report."""
+    def set(self, name: str, value: float, at: float = -inf) -> None:
+        """Take a report, which came ``at`` a time, s on the boot clock."""
+        if name in CORRECTIONS and self.values.get(name, value) != value:
+            self.switched.setdefault(CORRECTIONS[name], []).append(at)
         held = HELD.get(name)
         if held is not None:
             self.waiting.pop(name, None)
@@ -97,12 +108,18 @@ class ParametersInForce:
     def boot(self) -> None:
         """The autopilot has begun anew: it has read all of them, disarmed or not."""
         self.armed = None
+        self.switched.clear()
         self._apply(list(self.waiting))
         self._known.clear()
 
     def _apply(self, names: Sequence[str]) -> None:
         for name in names:
             self.values[name] = self.waiting.pop(name)
+
+    def switched_at(self, imu: int, moment: float, sigma: float) -> bool:
+        """Whether an accelerometer's correction for temperature was switched then, s, as said."""
+        early, late = moment - 2.0 * sigma, moment + 2.0 * sigma + REPORTED_S
+        return any(early <= at <= late for at in self.switched.get(imu, ()))
 
     def get(self, *names: str, default: float) -> float:
         """First of ``names`` that is known."""

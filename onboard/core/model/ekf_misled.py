@@ -97,7 +97,7 @@ class EkfJumped(_Answer):
     def __init__(self, moment: float, sigma: Array) -> None:
         """Take the moment, s on the boot clock, and prior sigmas of the jump (3,), m/s^2."""
         self.moment = moment
-        self.name = f"ekf_jumped_{moment:.2f}"
+        self.name = f"ekf_jumped_{moment:.3f}"
         each = zip(AXIS, sigma.tolist(), strict=True)
         self.unknowns = tuple(Unknown(f"{self.name}_{a}", "m/s^2", 0.0, s) for a, s in each)
 

@@ -71,6 +71,8 @@ class Family:
             of gravity, or what an attitude that is off makes of the force.
         goes_below: unknowns of every model that are it with the other sign, and may be below
             their range beside it.
+        taken_off: (k,) of its unknowns what has been taken off the samples, from which these count;
+            None: nothing.
     """
 
     name: str = ""
@@ -79,6 +81,7 @@ class Family:
     is_read: ClassVar[bool] = True
     goes_below: ClassVar[tuple[str, ...]] = ()
     unknowns: tuple[Unknown, ...] = ()
+    taken_off: Array | None = None
 
     @property
     def never_negative(self) -> tuple[str, ...]:
@@ -226,6 +229,7 @@ class Model:
         index: of an unknown, by its name.
         prior: (m,) means before the flight, each in its unit.
         prior_sigma: (m,) standard deviations of them.
+        taken_off: (m,) what has been taken off the samples of each.
     """
 
     def __init__(self, families: Sequence[Family]) -> None:
@@ -249,6 +253,15 @@ class Model:
         self.index = {u.name: i for i, u in enumerate(self.unknowns)}
         self.prior = np.array([u.prior for u in self.unknowns])
         self.prior_sigma = np.array([u.prior_sigma for u in self.unknowns])
+        self.taken_off = np.zeros(at)
+        for family in self.families:
+            if family.taken_off is not None:
+                self.taken_off[self.slices[family.name]] = family.taken_off
+
+    def whole(self, theta: Array) -> Array:
+        """Unknowns (m,) as errors of the recording: with what was taken off its samples."""
+        out: Array = theta + self.taken_off
+        return out
 
     def taken_over(self, other: Model, theta: Array, covariance: Array) -> tuple[Array, Array]:
         """An estimate of another model's unknowns as one of these, by their names.
@@ -264,7 +277,7 @@ class Model:
         mine = [i for i, u in enumerate(self.unknowns) if u.name in other.index]
         theirs = [other.index[self.unknowns[i].name] for i in mine]
         out, spread = self.prior.copy(), np.diag(self.prior_sigma**2)
-        out[mine] = theta[theirs]
+        out[mine] = theta[theirs] + other.taken_off[theirs] - self.taken_off[mine]
         spread[np.ix_(mine, mine)] = covariance[np.ix_(theirs, theirs)]
         return out, spread
 

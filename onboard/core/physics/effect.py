@@ -229,6 +229,12 @@ class Effect(Family):
         return tuple(u.name for u in sizes) if self.positive else ()
 
     @property
+    def misleads_ekf(self) -> bool:
+        """Whether its size, as far as it was taken off the samples, is past what an EKF learns."""
+        taken = np.zeros(1) if self.taken_off is None else self.taken_off
+        return bool(np.max(np.abs(taken)) > danger.BIAS_M_S2)
+
+    @property
     def shaped(self) -> bool:
         """Whether it has unknowns of its shape."""
         return len(self.unknowns) > len(self.keys)

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from onboard.answers.verdict import headline
@@ -14,6 +15,8 @@ from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import ESTIMATED, NO_VARIANCES, NoiseLevels
 from onboard.core.inputs.samples import AttitudeSample
+from onboard.core.physics.effect import Origin
+from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.mavlink.decode import Decoder
 from sitl.builtin.truth import random_imus
 from sitl.recording import FlightSpec, fly_messages
@@ -66,3 +69,14 @@ def test_a_heading_that_wanders_by_a_radian_is_said(size, wrong):
     assert headline(said).endswith(", but the heading is wrong") is (
         wrong and said.verdict is Verdict.CLEAN
     )
+
+
+def test_a_gyroscope_is_not_blamed_for_an_attitude_that_the_accelerometer_has_misled():
+    loud = replace(NoiseLevels(), bias_walk=LIMITS["bias_walk"][1])
+    assert "gyroscope" in excess_in_words(loud)
+    assert "gyroscope" not in excess_in_words(loud, misled=True)
+    assert "roll and pitch" in excess_in_words(loud, misled=True)
+    jump = BiasStep(Origin(t0=0.0)).at(50.0)
+    assert not jump.misleads_ekf
+    assert not jump.about(np.array([0.9, 0.0, -0.5])).misleads_ekf
+    assert jump.about(np.array([0.0, -3.0, 0.0])).misleads_ekf

@@ -1,4 +1,4 @@
-"""An offset that jumps twice is two jumps, and nothing slower; what is slower is no two jumps."""
+"""What jumps twice is two jumps, of either kind, and nothing slower; what is slower is no two."""
 
 import numpy as np
 import pytest
@@ -11,6 +11,8 @@ from sitl.recording import FlightSpec
 
 pytestmark = pytest.mark.slow
 SIGMAS = 4.0
+FIRST_S = 1.0
+"""First sample, s on the boot clock, which the simulator's times are of."""
 
 
 def diagnosed(*effects, vehicle="copter", seed=5, duration=190.0):
@@ -56,3 +58,30 @@ def test_what_grows_is_no_staircase():
     d, _ = diagnosed(concealed.BiasRamp(x=0.002, z=-0.0015), seed=7)
     assert "bias_ramp" in {e.name for e in d.effects}
     assert not jumps_of(d)
+
+
+@pytest.mark.parametrize(
+    ("seed", "of_scale", "of_offset"),
+    [(8, 75.0, 135.0), (9, 120.0, 70.0), (10, 100.0, 100.0)],
+)
+def test_scale_and_offset_that_jump_are_both_told(seed, of_scale, of_offset):
+    """One after the other, or both at once: neither is taken for something slower."""
+    steps = (
+        concealed.ScaleStep(time=of_scale, z=0.05),
+        concealed.BiasStep(time=of_offset, x=-0.4),
+    )
+    d, truth = diagnosed(*steps, vehicle="plane", seed=seed)
+    told = {e.name: e.unknowns for e in d.effects}
+    assert {"scale_step", "bias_step"} <= set(told)
+    assert not set(told) & {"bias_ramp", "temperature_drift", "throttle_coupling", "clock_skew"}
+    for name, time, axis, size in (
+        ("scale_step", of_scale, "z", 0.05),
+        ("bias_step", of_offset, "x", -0.4),
+    ):
+        q = told[name]
+        assert abs(q["time"].value + FIRST_S - time) < 0.5
+        # What reads too much is counted by the calibration's own scale.
+        assert abs(q[axis].value - size) < SIGMAS * np.hypot(q[axis].sigma, 0.03 * abs(size))
+    c = d.calibration
+    off = np.subtract(c.scale + c.offset, truth.scale + truth.offset)
+    assert np.all(np.abs(off) < SIGMAS * np.array(c.scale_sigma + c.offset_sigma))

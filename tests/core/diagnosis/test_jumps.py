@@ -2,6 +2,7 @@
 
 import weakref
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from onboard.core.diagnosis.effort import FORGOTTEN_S, MOST_AT_ONCE
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import SCAN_S
 from onboard.core.diagnosis.procedure import diagnose
-from onboard.core.diagnosis.score import time_sigma
+from onboard.core.diagnosis.score import Peak, time_sigma
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.stepped import JumpingPass, Places, Stepped
 from onboard.core.estimate.calibration_model import calibration_model
@@ -55,6 +56,35 @@ def test_a_moment_is_known_as_its_likelihood_bends(sigma):
 
 def test_one_moment_is_known_to_the_spacing_of_those_looked_at():
     assert time_sigma(np.array([3.0]), np.array([9.0]), 0.6) == pytest.approx(0.6 / np.sqrt(12.0))
+
+
+SAMPLE_S = 0.02
+SAMPLED = SimpleNamespace(
+    batches=[SimpleNamespace(segment=SimpleNamespace(t=SAMPLE_S * np.arange(500)))]
+)
+
+
+@pytest.mark.parametrize(("sigma", "known"), [(3.0, 3.0), (0.2, 0.2), (0.03, 0.03), (1e-4, 0.0)])
+def test_a_moment_is_looked_at_as_closely_as_its_likelihood_bends(sigma, known):
+    def like(t):
+        asked.append(t)
+        return 9000.0 - 500.0 * np.log1p(((t - 50.37) / sigma) ** 2 / 500.0)
+
+    asked = []
+    t = np.arange(42.0, 59.0, 0.5)
+    peak = jumps._resolved(SAMPLED, like, Peak(t, like(t), 0.5))
+    assert peak.best == pytest.approx(50.37, abs=max(0.2 * sigma, SAMPLE_S))
+    assert peak.sigma == pytest.approx(known, rel=0.3, abs=0.5 * SAMPLE_S)
+    assert len(asked) == (1 if sigma > 0.5 else len(asked)) <= 4
+
+
+def test_a_moment_that_no_fix_tells_is_as_unsure_as_the_gap_is_long():
+    t = np.arange(40.0, 80.0, 2.0)
+    peak = Peak(t, np.where((t > 50.0) & (t < 70.0), 300.0, 0.0), 2.0)
+    near = peak.best + 0.5 * np.arange(-6.0, 7.0)
+    # The next pass over the flight counts all of them otherwise.
+    closer = peak.closer(near, np.where((near > 50.0) & (near < 70.0), 310.0, 10.0), 0.5)
+    assert closer.sigma == pytest.approx(20.0 / np.sqrt(12.0), rel=0.1)
 
 
 @pytest.fixture(scope="module", params=["copter", "plane"])

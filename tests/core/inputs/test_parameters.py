@@ -114,3 +114,18 @@ def test_a_flight_in_which_the_board_is_said_to_be_turned_is_what_it_is_without(
 def test_who_finds_the_attitude(values, gain):
     """Before there was a choice of EKF it was DCM, unless the first one was switched on."""
     assert ParametersInForce(dict(values)).dcm_gain == gain
+
+
+def test_when_a_correction_for_temperature_was_switched_is_kept_until_the_next_boot():
+    parameters = ParametersInForce()
+    parameters.set("INS_TCAL2_ENABLE", 0.0, 10.0)  # what it was before nobody knows
+    parameters.set("INS_TCAL2_ENABLE", 0.0, 20.0)
+    assert not parameters.switched
+    parameters.set("INS_TCAL2_ENABLE", 1.0, 80.0)
+    assert parameters.switched_at(2, 79.5, 0.3)  # a report comes late
+    assert parameters.switched_at(2, 81.0, 0.6)
+    assert not parameters.switched_at(2, 82.0, 0.3)  # and not before what it reports
+    assert not parameters.switched_at(2, 70.0, 0.3)
+    assert not parameters.switched_at(1, 79.5, 0.3)
+    parameters.boot()
+    assert not parameters.switched

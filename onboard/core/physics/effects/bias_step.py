@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Unknown
@@ -17,14 +19,18 @@ from onboard.core.physics.finding import Finding
 from onboard.core.physics.wording import jumped
 
 LARGEST = 3.0
-"""m/s^2; a sensor that jumps by more is broken and not miscalibrated."""
+"""m/s^2, a sigma: a sensor that jumps by more is broken and not miscalibrated, which is seldom."""
 
 RANGE = 157.0
-"""m/s^2; a sensor that other ones have seen break may read all that it can, 16 g [data sheet]."""
+"""m/s^2; a sensor that breaks may read all that it can, 16 g [data sheet]."""
 
 SHARED_CURE = Cure(
     "look at what all accelerometers share, for each asks for this jump: the mount of "
     "the autopilot, GPS, the compass, a blow"
+)
+SWITCHED_CURE = Cure(
+    "nothing gave way: the correction for temperature (INS_TCALn_ENABLE) was switched then; set it "
+    "as it is to stay, and calibrate again"
 )
 
 
@@ -93,11 +99,11 @@ class BiasStep(Effect):
         made = copy(self)
         made.onset = moment
         made.onset_sigma = self.onset_sigma if sigma is None else sigma
-        made.name = f"bias_step_{moment:.2f}"
+        made.name = f"bias_step_{moment:.3f}"
         made.take_axes("m/s^2", LARGEST)
+        made.plausible = (RANGE,) * 3
         made.witness = witness or self.witness
         if made.witness is not None:
-            made.plausible = (RANGE,) * 3
             seen = zip(made.unknowns, made.witness.size, made.witness.sigma, strict=True)
             made.unknowns = tuple(
                 Unknown(u.name, u.unit, float(size), min(float(sigma), LARGEST))
@@ -115,6 +121,28 @@ class BiasStep(Effect):
         if self.onset is None:
             raise ValueError("a jump without its moment")
         return self.onset
+
+    def about(self, size: Array, beside: Sequence[tuple[Effect, Array]] = ()) -> Self:  # noqa: ARG002
+        """The same jump, of which ``size`` (3,) is taken off the samples: it counts from there.
+
+        The force that was read turns what an attitude errs by into a velocity.  With a jump of a
+        third of gravity in it, a third of that is wrong.
+        """
+        made = copy(self)
+        more = size if self.taken_off is None else size - self.taken_off
+        made.taken_off = size
+        made.unknowns = tuple(
+            replace(u, prior=u.prior - float(x)) for u, x in zip(self.unknowns, more, strict=True)
+        )
+        return made
+
+    def off_samples(self, segment: Segment, scale: Array) -> Segment:
+        """A segment without what is taken off it, by a calibration's scale (3,)."""
+        if self.taken_off is None:
+            return segment
+        after = (segment.t >= self.moment)[:, None]
+        raw = segment.raw_s - after * (self.taken_off @ segment.R_bs / scale)
+        return replace(segment, raw_s=raw)
 
     def acceleration(self, nodes: Signals) -> Array:
         """``-e_i`` from the moment on."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from copy import copy
+from math import inf
 from typing import Self
-
-import numpy as np
 
 from onboard.core.maths.arrays import Array
 from onboard.core.model.quadrature import Signals
@@ -55,14 +54,19 @@ class ScaleStep(Proportional):
         """The jump at a moment, s on the boot clock, which is known to ``sigma``, s."""
         made = copy(self)
         made.onset, made.onset_sigma = moment, sigma
-        made.name = f"scale_step_{moment:.2f}"
+        made.name = f"scale_step_{moment:.3f}"
         made.take_axes("1", LARGEST)
         made.witness = witness
         return made
 
+    @property
+    def moment(self) -> float:
+        """When it jumped, s on the boot clock; never, as long as it has no moment."""
+        return inf if self.onset is None else self.onset
+
     def acceleration(self, nodes: Signals) -> Array:
         """``-f_i e_i`` from the moment on."""
-        after = nodes.t >= (np.inf if self.onset is None else self.onset)
+        after = nodes.t >= self.moment
         return super().acceleration(nodes) * after[..., None, None]
 
     def amount(self, f_b: Array) -> Array:
