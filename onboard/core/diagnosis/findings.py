@@ -86,15 +86,10 @@ class Findings:
     def _effect(self, f: Effect) -> Finding:
         final = self._final
         index = [i for i in final.all if i in final.engine.indices(f)]
-        sigma = np.sqrt(np.diag(final.solution.covariance))
+        theta, C = final.solution.theta[index], final.solution.covariance[np.ix_(index, index)]
         taken = {"clock_rate": final.engine.point.skew}
-        # The sizes come first; there are no keys for the shapes after them.
-        quantities = {
-            key: Quantity(
-                float(final.solution.theta[i]) + taken.get(u.name, 0.0), float(sigma[i]), u.unit
-            )
-            for key, i, u in zip(f.keys, index, f.unknowns, strict=False)
-        }
+        theta = theta + np.array([taken.get(u.name, 0.0) for u in f.unknowns])
+        quantities = f.sized(theta, C)
         if f.onset is not None:
             quantities = {
                 "time": Quantity(f.onset - final.origin.t0, f.onset_sigma, "s"),
@@ -111,13 +106,11 @@ class Findings:
             formula=f.formula([quantities[k].value for k in f.keys]),
         )
         if made.response_curve is not None and f.shaped:
-            C = final.solution.covariance[np.ix_(index, index)]
-            curve = f.bent(made.response_curve, final.solution.theta[index], C)
-            made = replace(made, response_curve=curve)
+            made = replace(made, response_curve=f.bent(made.response_curve, theta, C))
         if f.onset is None:
             return made
         span = ((f.onset - final.origin.t0, final.engine.blocks[-1].end - final.origin.t0),)
-        axis = main_axis(final.solution.theta[index])
+        axis = main_axis(theta)
         return replace(made, where=spans(final.engine.batches, final.origin.t0, span, axis))
 
     def _confounders(self, f: Effect) -> tuple[Confounder, ...]:

@@ -41,6 +41,7 @@ from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, only, opened, settled
 from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.diagnosis.twice import jumped_twice
+from onboard.core.diagnosis.wander import wandering
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.inputs.clock_rates import most_growth
@@ -94,6 +95,7 @@ def examine(
     if len(steady) < len(families):
         final, families = only(full, steady, final)
     final, families = opened(full, families, final)
+    final, families = wandering(full, families, final, origin)
     return Judge(
         calibrator,
         imu,

@@ -1,0 +1,169 @@
+"""An offset that wanders: how much by the sums of blocks, then by columns of its own.
+
+A model has one offset for a flight.  A sensor's is not quite the same from minute to minute, and
+blocks of the flight then contradict each other.  As flicker noise it is one number for each axis,
+its instability: how likely the sums are for any of it has a closed form, with what wanders and
+everything else integrated out.  It is asked of sums that are there, the offset's own columns
+standing for it within a block, so that a flight without it costs nothing.  Twice the rise of that
+logarithm is chi-square at the most (none is at the bound of each number: half of the flights gain
+nothing at all; Self and Liang 1987).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from onboard.core.diagnosis.block_jumps import OFFSETS
+from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.score import least, surprise
+from onboard.core.diagnosis.settling import needed_beside, only
+from onboard.core.estimate.limits import FEWEST_BLOCKS, OFFSET_FLOOR
+from onboard.core.estimate.solution import share_of_gram
+from onboard.core.maths.arrays import Array
+from onboard.core.maths.blocks import total
+from onboard.core.maths.flicker import waves, waves_variance
+from onboard.core.physics.effect import AXES, Effect, Origin
+from onboard.core.physics.effects.offset_wander import PLAUSIBLE, OffsetWander
+
+WAVES = 24
+"""Cosines for each axis: a pass takes as long as one that looks for a jump [cost]."""
+TRIED = OFFSET_FLOOR * 2.0 ** np.arange(0.0, np.log2(PLAUSIBLE / OFFSET_FLOOR) + 0.25, 0.25)
+"""m/s^2, of the instability: from what is nothing beside what no model knows [cost]."""
+SWEEPS = 3
+"""Over the axes: what one wanders hardly bears on another [cost]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What sums say of amplitudes about nothing, everything else left free.
+
+    Attributes:
+        S: (n, n) information.
+        s: (n,) that times what they ask for.
+        axis: (n,) which axis each is of.
+        variance: (n,) of each, of unit instability.
+    """
+
+    S: Array
+    s: Array
+    axis: Array
+    variance: Array
+
+    def likelier(self, instability: Array) -> float:
+        """Rise of the logarithm of the likelihood by some instability (3,), m/s^2."""
+        root = np.sqrt(self.variance) * instability[self.axis]
+        on = root > 0.0
+        if not np.any(on):
+            return 0.0
+        root = root[on]
+        L = np.linalg.cholesky(np.eye(len(root)) + root[:, None] * self.S[np.ix_(on, on)] * root)
+        x = np.linalg.solve(L, root * self.s[on])
+        return float(0.5 * x @ x - np.sum(np.log(np.diagonal(L))))
+
+    def likeliest(self) -> tuple[Array, float]:
+        """(3,) of the instability, m/s^2, and by how much that is likelier than none."""
+        best, most = np.zeros(3), 0.0
+        for _ in range(SWEEPS):
+            for axis in range(3):
+                ways = np.tile(best, (len(TRIED) + 1, 1))
+                ways[1:, axis], ways[0, axis] = TRIED, 0.0
+                rise = [self.likelier(way) for way in ways]
+                best, most = ways[int(np.argmax(rise))], max(rise)
+        return best, most
+
+
+def wandering(
+    full: Examination, families: list[Effect], final: Examination, origin: Origin
+) -> tuple[Examination, list[Effect]]:
+    """The model that stands, with an offset that wanders where that is no chance.
+
+    Args:
+        full: with every column of the catalogue.
+        families: of the model that stands.
+        final: that model.
+        origin: what effects count from.
+    """
+    blocks = final.all_blocks
+    starts = np.array([b.start for b in blocks])
+    if len(blocks) < FEWEST_BLOCKS or np.any(np.diff(starts) <= 0.0):
+        return final, families  # where a clock begins anew a walk has no time
+    start, end = blocks[0].start, blocks[-1].end
+    instability_s, gain = by_blocks(final).likeliest()
+    if _by_chance(gain):
+        return final, families
+    R_bs = final.batches[0].segment.R_bs
+    wander = OffsetWander(origin).along(start, end, np.abs(R_bs) @ instability_s, WAVES)
+    made, _ = only(full, [*families, wander], final)
+    instability_b, gain = by_columns(made, wander).likeliest()
+    if _by_chance(gain):
+        return final, families
+    wander = wander.along(start, end, instability_b, WAVES)
+    made, _ = only(full, [*families, wander], made)
+    # What wanders may have passed for something that has a name.
+    kept = needed_beside(made, families)
+    if len(kept) < len(families):
+        made, _ = only(full, [*kept, wander], made)
+    return made, [*kept, wander]
+
+
+def by_blocks(made: Examination) -> Told:
+    """What sums of blocks say of a wander of the offsets along sensor axes."""
+    blocks, m, n = made.all_blocks, made.model.size, 3 * WAVES
+    start, end = blocks[0].start, blocks[-1].end
+    share = _share(made)
+    N, b = np.zeros((m + n, m + n)), np.zeros(m + n)
+    for block in blocks:
+        wave = waves(np.array(0.5 * (block.start + block.end)), start, end, WAVES)
+        C = np.zeros((m, m + n))
+        C[:, :m] = np.eye(m)
+        for i, offset in enumerate(OFFSETS):
+            C[offset, m + i :: 3] = wave
+        sums = block.sums
+        N += C.T @ (sums.N - share * sums.G) @ C
+        b += C.T @ sums.b
+    return _told(made, N, b, list(range(m)), np.tile(np.arange(3), WAVES))
+
+
+def by_columns(made: Examination, wander: OffsetWander) -> Told:
+    """What the sums of an examination say of a wander that has columns in it, along body axes."""
+    mine = made.indices(wander)
+    others = [i for i in range(made.model.size) if i not in set(mine)]
+    order = [*others, *mine]
+    sums = total(made.all_blocks)
+    N = (sums.N - _share(made) * sums.G)[np.ix_(order, order)]
+    axis = np.tile([AXES.index(a) for a in wander.keys], wander.count)
+    return _told(made, N, sums.b[order], others, axis)
+
+
+def _share(made: Examination) -> float:
+    """Of the noise in the regressors, as solutions take it off."""
+    return share_of_gram(total(made.all_blocks), np.diag(made.model.prior_sigma**-2.0))
+
+
+def _told(made: Examination, N: Array, b: Array, others: Sequence[int], axis: Array) -> Told:
+    """What is left of sums for amplitudes, everything else eliminated.
+
+    Args:
+        made: has noise as large as its residual, and the prior.
+        N: of the others first, then of the amplitudes, wave by wave.
+        b: likewise.
+        others: their places in the model.
+        axis: which each amplitude is of.
+    """
+    m, prior = len(others), made.model.prior_sigma[list(others)] ** -2.0
+    A = N[:m, :m] + np.diag(prior)
+    known = b[:m] + prior * made.model.prior[list(others)]
+    gone = np.linalg.solve(A, np.column_stack([N[:m, m:], known]))
+    S = N[m:, m:] - N[m:, :m] @ gone[:, :-1]
+    noise = max(1.0, made.found().nis)
+    variance = np.repeat(waves_variance(WAVES), len(axis) // WAVES)
+    return Told(
+        (S + S.T) / (2.0 * noise), (b[m:] - N[m:, :m] @ gone[:, -1]) / noise, axis, variance
+    )
+
+
+def _by_chance(gain: float) -> bool:
+    return surprise(2.0 * gain, 3) < least()
