@@ -75,10 +75,21 @@ class Told:
         return best, most
 
 
+@dataclass(frozen=True, slots=True)
+class Wandering:
+    """An offset that wanders: what it is, the model with it, what of the others is needed."""
+
+    wander: OffsetWander
+    made: Examination
+    kept: list[Effect]
+    settled: bool
+    """Whether all that was chosen without it stands beside it, has a name, and is all there is."""
+
+
 def wandering(
-    full: Examination, families: list[Effect], final: Examination, origin: Origin
-) -> tuple[Examination, list[Effect]]:
-    """The model that stands, with an offset that wanders where that is no chance.
+    full: Examination, families: Sequence[Effect], final: Examination, origin: Origin
+) -> Wandering | None:
+    """An offset that wanders beside the model that stands; None where that may be chance.
 
     Args:
         full: with every column of the catalogue.
@@ -89,24 +100,31 @@ def wandering(
     blocks = final.all_blocks
     starts = np.array([b.start for b in blocks])
     if len(blocks) < FEWEST_BLOCKS or np.any(np.diff(starts) <= 0.0):
-        return final, families  # where a clock begins anew a walk has no time
+        return None  # where a clock begins anew nothing goes on
     start, end = blocks[0].start, blocks[-1].end
     instability_s, gain = by_blocks(final).likeliest()
     if _by_chance(gain):
-        return final, families
+        return None
     R_bs = final.batches[0].segment.R_bs
     wander = OffsetWander(origin).along(start, end, np.abs(R_bs) @ instability_s, WAVES)
     made, _ = only(full, [*families, wander], final)
     instability_b, gain = by_columns(made, wander).likeliest()
     if _by_chance(gain):
-        return final, families
+        return None
     wander = wander.along(start, end, instability_b, WAVES)
     made, _ = only(full, [*families, wander], made)
     # What wanders may have passed for something that has a name.
     kept = needed_beside(made, families)
-    if len(kept) < len(families):
+    dropped = len(kept) < len(families)
+    if dropped:
         made, _ = only(full, [*kept, wander], made)
-    return made, [*kept, wander]
+    left = made.found().contradicts or any(not f.named for f in kept)
+    return Wandering(wander, made, kept, settled=not (dropped or left))
+
+
+def still_wanders(made: Examination, wander: OffsetWander) -> bool:
+    """Whether it is no chance beside what was chosen with it."""
+    return not _by_chance(by_columns(made, wander).likelier(wander.instability_b))
 
 
 def by_blocks(made: Examination) -> Told:

@@ -74,6 +74,12 @@ class OffsetWander(Effect):
         return made
 
     @property
+    def instability_b(self) -> Array:
+        """(3,) along body axes, m/s^2."""
+        by = dict(zip(self.keys, self.instability, strict=True))
+        return np.array([by.get(a, 0.0) for a in AXES])
+
+    @property
     def count(self) -> int:
         """Cosines for each axis that wanders."""
         return len(self.unknowns) // max(len(self.keys), 1)
@@ -109,5 +115,5 @@ class OffsetWander(Effect):
 
     def unsteady(self) -> Array:
         """(3,) variance by which the mean of a next flight as long differs, (m/s^2)^2."""
-        by = dict(zip(self.keys, self.instability, strict=True))
-        return np.array([MEANS_APART * by.get(a, 0.0) ** 2 for a in AXES])
+        out: Array = MEANS_APART * self.instability_b**2
+        return out
