@@ -23,8 +23,10 @@ from onboard.core.diagnosis.settling import needed_beside, only
 from onboard.core.estimate.limits import FEWEST_BLOCKS, OFFSET_FLOOR
 from onboard.core.estimate.solution import share_of_gram
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import total
+from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.flicker import waves, waves_variance
+from onboard.core.maths.sums import NormalSums
+from onboard.core.model.regressors import Model
 from onboard.core.physics.effect import AXES, Effect, Origin
 from onboard.core.physics.effects.offset_wander import PLAUSIBLE, OffsetWander
 
@@ -102,7 +104,7 @@ def wandering(
     if len(blocks) < FEWEST_BLOCKS or np.any(np.diff(starts) <= 0.0):
         return None  # where a clock begins anew nothing goes on
     start, end = blocks[0].start, blocks[-1].end
-    instability_s, gain = by_blocks(final).likeliest()
+    instability_s, gain = by_blocks(blocks, final.model, final.found().nis).likeliest()
     if _by_chance(gain):
         return None
     R_bs = final.batches[0].segment.R_bs
@@ -127,60 +129,72 @@ def still_wanders(made: Examination, wander: OffsetWander) -> bool:
     return not _by_chance(by_columns(made, wander).likelier(wander.instability_b))
 
 
-def by_blocks(made: Examination) -> Told:
-    """What sums of blocks say of a wander of the offsets along sensor axes."""
-    blocks, m, n = made.all_blocks, made.model.size, 3 * WAVES
+def by_blocks(blocks: Sequence[Block], model: Model, nis: float) -> Told:
+    """What sums of blocks say of a wander of the offsets along sensor axes.
+
+    Args:
+        blocks: of a flight, in order of time.
+        model: of the sums, the six first.
+        nis: mean square of what its estimate leaves.
+    """
     start, end = blocks[0].start, blocks[-1].end
-    share = _share(made)
-    N, b = np.zeros((m + n, m + n)), np.zeros(m + n)
+    whole = total(blocks)
+    share = _share(whole, model)
+    middle = np.array([0.5 * (block.start + block.end) for block in blocks])
+    wave = waves(middle, start, end, WAVES)
+    own, cross, asked = [], [], []
     for block in blocks:
-        wave = waves(np.array(0.5 * (block.start + block.end)), start, end, WAVES)
-        C = np.zeros((m, m + n))
-        C[:, :m] = np.eye(m)
-        for i, offset in enumerate(OFFSETS):
-            C[offset, m + i :: 3] = wave
         sums = block.sums
-        N += C.T @ (sums.N - share * sums.G) @ C
-        b += C.T @ sums.b
-    return _told(made, N, b, list(range(m)), np.tile(np.arange(3), WAVES))
+        signal = sums.N - share * sums.G
+        own.append(signal[np.ix_(OFFSETS, OFFSETS)])
+        cross.append(signal[:, OFFSETS])
+        asked.append(sums.b[list(OFFSETS)])
+    m, n = model.size, 3 * WAVES
+    N, b = np.zeros((m + n, m + n)), np.zeros(m + n)
+    N[:m, :m], b[:m] = whole.N - share * whole.G, whole.b
+    N[:m, m:] = np.einsum("bmi,bk->mki", cross, wave).reshape(m, n)
+    N[m:, :m] = N[:m, m:].T
+    N[m:, m:] = np.einsum("bij,bk,bl->kilj", own, wave, wave, optimize=True).reshape(n, n)
+    b[m:] = np.einsum("bi,bk->ki", asked, wave).ravel()
+    return _left(N, b, model, list(range(m)), nis, np.tile(np.arange(3), WAVES))
 
 
 def by_columns(made: Examination, wander: OffsetWander) -> Told:
     """What the sums of an examination say of a wander that has columns in it, along body axes."""
     mine = made.indices(wander)
     others = [i for i in range(made.model.size) if i not in set(mine)]
-    order = [*others, *mine]
+    at = [*others, *mine]
     sums = total(made.all_blocks)
-    N = (sums.N - _share(made) * sums.G)[np.ix_(order, order)]
+    N = (sums.N - _share(sums, made.model) * sums.G)[np.ix_(at, at)]
     axis = np.tile([AXES.index(a) for a in wander.keys], wander.count)
-    return _told(made, N, sums.b[order], others, axis)
+    return _left(N, sums.b[at], made.model, others, made.found().nis, axis)
 
 
-def _share(made: Examination) -> float:
+def _share(sums: NormalSums, model: Model) -> float:
     """Of the noise in the regressors, as solutions take it off."""
-    return share_of_gram(total(made.all_blocks), np.diag(made.model.prior_sigma**-2.0))
+    return share_of_gram(sums, np.diag(model.prior_sigma**-2.0))
 
 
-def _told(made: Examination, N: Array, b: Array, others: Sequence[int], axis: Array) -> Told:
+def _left(N: Array, b: Array, model: Model, others: Sequence[int], nis: float, axis: Array) -> Told:
     """What is left of sums for amplitudes, everything else eliminated.
 
     Args:
-        made: has noise as large as its residual, and the prior.
         N: of the others first, then of the amplitudes, wave by wave.
         b: likewise.
-        others: their places in the model.
+        model: has the prior of the others.
+        others: their places in it.
+        nis: noise is no less than what an estimate leaves.
         axis: which each amplitude is of.
     """
-    m, prior = len(others), made.model.prior_sigma[list(others)] ** -2.0
+    m, at = len(others), list(others)
+    prior = model.prior_sigma[at] ** -2.0
     A = N[:m, :m] + np.diag(prior)
-    known = b[:m] + prior * made.model.prior[list(others)]
-    gone = np.linalg.solve(A, np.column_stack([N[:m, m:], known]))
+    gone = np.linalg.solve(A, np.column_stack([N[:m, m:], b[:m] + prior * model.prior[at]]))
     S = N[m:, m:] - N[m:, :m] @ gone[:, :-1]
-    noise = max(1.0, made.found().nis)
+    s = b[m:] - N[m:, :m] @ gone[:, -1]
+    noise = max(1.0, nis)
     variance = np.repeat(waves_variance(WAVES), len(axis) // WAVES)
-    return Told(
-        (S + S.T) / (2.0 * noise), (b[m:] - N[m:, :m] @ gone[:, -1]) / noise, axis, variance
-    )
+    return Told((S + S.T) / (2.0 * noise), s / noise, axis, variance)
 
 
 def _by_chance(gain: float) -> bool:

@@ -1,13 +1,14 @@
 """Flicker noise over a span: the floor of a sensor's Allan deviation, as a sum of cosines.
 
-Noise of density ``B^2 / (2 pi f)``, two-sided in time and one-sided in frequency, is called bias
-instability ``B`` (IEEE Std 952-1997, annex C): its Allan deviation is ``0.664 B`` at every time of
-averaging.  About its mean over a span ``T`` it is taken for a sum of
+Noise of the two-sided density ``B^2 / (2 pi f)`` has the bias instability ``B`` (IEEE Std 952-1997,
+annex C): its Allan deviation is ``0.664 B`` at every time of averaging.  About its mean over a span
+``T`` it is taken for a sum of
 
     c_k(t) = sqrt(2) cos(pi k (t - start) / T),    k = 1 ... n,
 
 of unit mean square, which are independent and stand for the frequencies about ``k / (2 T)``: their
-amplitudes have the variance ``B^2 / (2 pi k)``, whatever the span is.
+amplitudes have the variance ``B^2 / (pi k)``, whatever the span is (that of the slowest is a fifth
+less: a cosine is not quite what a span of it is made of).
 """
 
 from __future__ import annotations
@@ -32,5 +33,5 @@ def waves(t: Array, start: float, end: float, count: int) -> Array:
 
 def waves_variance(count: int) -> Array:
     """(count,) variances of their amplitudes, of unit instability."""
-    out: Array = np.asarray(0.5 / (np.pi * np.arange(1, count + 1)), dtype=np.float64)
+    out: Array = np.asarray(1.0 / (np.pi * np.arange(1, count + 1)), dtype=np.float64)
     return out
