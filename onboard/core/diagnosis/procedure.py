@@ -87,7 +87,12 @@ def examine(
     companions = _companions(calibrator, imu, clear, latest=latest, since=since)
     asked = _Asked(clear.testable, companions, imu)
     stands = _modelled(clear.full, asked, origin, calibrator, named_only=clear.clipped)
-    wander = wandering(stands.full, stands.families, stands.final, origin)
+    # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
+    wander = None
+    if clear.fault is None:
+        wander = wandering(
+            stands.full, stands.families, stands.final, origin, calibrator.parameters
+        )
     if wander is not None:
         stands = _beside_wander(stands, wander, asked, origin, calibrator, clear)
     return Judge(

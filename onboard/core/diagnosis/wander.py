@@ -18,10 +18,13 @@ import numpy as np
 
 from onboard.core.diagnosis.block_jumps import OFFSETS
 from onboard.core.diagnosis.examination import Examination
+from onboard.core.diagnosis.final_model import FinalModel
+from onboard.core.diagnosis.flight_constants import inconstant
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.settling import needed_beside, only
 from onboard.core.estimate.limits import FEWEST_BLOCKS, OFFSET_FLOOR
 from onboard.core.estimate.solution import share_of_gram
+from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.blocks import Block, total
 from onboard.core.maths.flicker import waves, waves_variance
@@ -32,8 +35,9 @@ from onboard.core.physics.effects.offset_wander import PLAUSIBLE, OffsetWander
 
 WAVES = 24
 """Cosines for each axis: a pass takes as long as one that looks for a jump [cost]."""
-TRIED = OFFSET_FLOOR * 2.0 ** np.arange(0.0, np.log2(PLAUSIBLE / OFFSET_FLOOR) + 0.25, 0.25)
-"""m/s^2, of the instability: from what is nothing beside what no model knows [cost]."""
+TRIED = OFFSET_FLOOR * 2.0 ** np.arange(0.0, np.log2(2.0 * PLAUSIBLE / OFFSET_FLOOR) + 0.25, 0.25)
+"""m/s^2, of the instability: from what is nothing beside what no model knows, to what cannot be
+[cost]."""
 SWEEPS = 3
 """Over the axes: what one wanders hardly bears on another [cost]."""
 
@@ -89,15 +93,22 @@ class Wandering:
 
 
 def wandering(
-    full: Examination, families: Sequence[Effect], final: Examination, origin: Origin
+    full: Examination,
+    families: Sequence[Effect],
+    final: Examination,
+    origin: Origin,
+    parameters: ParametersInForce,
 ) -> Wandering | None:
     """An offset that wanders beside the model that stands; None where that may be chance.
+
+    None either where a constant of the flight is none: what makes up for that wanders, too.
 
     Args:
         full: with every column of the catalogue.
         families: of the model that stands.
         final: that model.
         origin: what effects count from.
+        parameters: in force.
     """
     blocks = final.all_blocks
     starts = np.array([b.start for b in blocks])
@@ -105,13 +116,15 @@ def wandering(
         return None  # where a clock begins anew nothing goes on
     start, end = blocks[0].start, blocks[-1].end
     instability_s, gain = by_blocks(blocks, final.model, final.found().nis).likeliest()
-    if _by_chance(gain):
+    if not _believed(instability_s, gain):
+        return None
+    if any(c.contradicts for c in inconstant(FinalModel(final, families, origin, parameters))):
         return None
     R_bs = final.batches[0].segment.R_bs
     wander = OffsetWander(origin).along(start, end, np.abs(R_bs) @ instability_s, WAVES)
     made, _ = only(full, [*families, wander], final)
     instability_b, gain = by_columns(made, wander).likeliest()
-    if _by_chance(gain):
+    if not _believed(instability_b, gain):
         return None
     wander = wander.along(start, end, instability_b, WAVES)
     made, _ = only(full, [*families, wander], made)
@@ -126,7 +139,8 @@ def wandering(
 
 def still_wanders(made: Examination, wander: OffsetWander) -> bool:
     """Whether it is no chance beside what was chosen with it."""
-    return not _by_chance(by_columns(made, wander).likelier(wander.instability_b))
+    of = wander.instability_b
+    return _believed(of, by_columns(made, wander).likelier(of))
 
 
 def by_blocks(blocks: Sequence[Block], model: Model, nis: float) -> Told:
@@ -197,5 +211,6 @@ def _left(N: Array, b: Array, model: Model, others: Sequence[int], nis: float, a
     return Told((S + S.T) / (2.0 * noise), s / noise, axis, variance)
 
 
-def _by_chance(gain: float) -> bool:
-    return surprise(2.0 * gain, 3) < least()
+def _believed(instability: Array, gain: float) -> bool:
+    """Whether it is no chance, and no more than a sensor's can be."""
+    return surprise(2.0 * gain, 3) >= least() and bool(np.all(instability <= PLAUSIBLE))

@@ -17,9 +17,9 @@ from onboard.core.physics import response_curves as curves
 from onboard.core.physics.effect import AXES, Bearing, Effect, on_axes
 from onboard.core.physics.finding import Quantity, ResponseCurve
 
-PLAUSIBLE = 1.0
+PLAUSIBLE = 0.3
 """m/s^2; a sensor that wanders by more is broken [data sheet: the offset of an MPU-6000 changes by
-0.6 along z from 0 to 70 degC]."""
+0.34 along x and y from 0 to 70 degC]."""
 TINY = 1e-12
 """m/s^2; a wander of nothing has no direction."""
 
