@@ -45,6 +45,7 @@ from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import SixParameters
+from onboard.core.maths.arrays import Array
 from onboard.core.model.nuisances import LeverArmError
 from onboard.core.physics.catalogue import kind_of, kinds
 from onboard.core.physics.effect import Effect, Origin
@@ -94,7 +95,7 @@ class Judge:
         self.engine, self.choice, self.sampled = evidence.final, evidence.choice, evidence.sampled
         self.absent, self.excluded = list(absent), list(excluded)
         self.undecided = undecided(evidence.choice, evidence.families)
-        self.left_open = left_open(self.undecided)
+        self.left_open = left_open(self.undecided) + _unsteady(evidence)
         made = calibrator.calibration_with(imu, evidence.final, self.left_open)
         self.calibration: Calibration = made.untold(CUT) if evidence.clipped else made
         self.final = FinalModel(evidence.final, evidence.families, origin, calibrator.parameters)
@@ -289,6 +290,15 @@ class Judge:
             and c.columns is not None
             and all(s > p for s, p in zip(u.smallest.values(), c.plausible, strict=True))
         ]
+
+
+def _unsteady(evidence: Evidence) -> Array:
+    """(6, 6) by how much scale and beta of another flight differ, by what was found."""
+    R_bs = evidence.final.batches[0].segment.R_bs
+    by_axis = sum((f.unsteady() for f in evidence.families), np.zeros(3))
+    out = np.zeros((6, 6))
+    out[3:, 3:] = np.diag(R_bs.T**2 @ by_axis)
+    return out
 
 
 def _not_compared(unused: Sequence[Unused]) -> tuple[Unused, ...]:

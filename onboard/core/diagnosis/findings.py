@@ -86,14 +86,10 @@ class Findings:
     def _effect(self, f: Effect) -> Finding:
         final = self._final
         index = [i for i in final.all if i in final.engine.indices(f)]
-        sigma = np.sqrt(np.diag(final.solution.covariance))
         held = final.engine.absent
-        sizes = final.solution.theta - held
-        # The sizes come first; there are no keys for the shapes after them.
-        quantities = {
-            key: Quantity(float(sizes[i]), float(sigma[i]), u.unit)
-            for key, i, u in zip(f.keys, index, f.unknowns, strict=False)
-        }
+        theta = (final.solution.theta - held)[index]
+        C = final.solution.covariance[np.ix_(index, index)]
+        quantities = f.sized(theta, C)
         if f.onset is not None:
             quantities = {
                 "time": Quantity(f.onset - final.origin.t0, f.onset_sigma, "s"),
@@ -108,13 +104,11 @@ class Findings:
             formula=f.formula([quantities[k].value for k in f.keys]),
         )
         if made.response_curve is not None and f.shaped:
-            C = final.solution.covariance[np.ix_(index, index)]
-            curve = f.bent(made.response_curve, final.solution.theta[index], C)
-            made = replace(made, response_curve=curve)
+            made = replace(made, response_curve=f.bent(made.response_curve, theta, C))
         if f.onset is None:
             return made
         span = ((f.onset - final.origin.t0, final.engine.blocks[-1].end - final.origin.t0),)
-        axis = main_axis(sizes[index])
+        axis = main_axis(theta)
         return replace(made, where=spans(final.engine.batches, final.origin.t0, span, axis))
 
     def _cure(self, f: Effect, values: Mapping[str, float]) -> Cure:

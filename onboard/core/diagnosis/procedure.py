@@ -8,8 +8,8 @@ timing and residuals.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf, log
 
 from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot
@@ -41,6 +41,7 @@ from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, only, opened, settled
 from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.diagnosis.twice import jumped_twice
+from onboard.core.diagnosis.wander import Wandering, still_wanders, wandering
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.inputs.clock_rates import most_growth
@@ -84,28 +85,28 @@ def examine(
     origin = _origin(calibrator, imu, flight, latest=latest)
     clear = cleared(calibrator, engine, flight, origin, beside)
     companions = _companions(calibrator, imu, clear, latest=latest, since=since)
-    full, choice = _selected(clear.full, _Asked(clear.testable, companions, imu), origin)
-    if full is not clear.full:
-        clear.full.let_sums_go()
-    rivals = compared(choice, full, calibrator, imu)
-    families = families_of(choice)
-    final, families = settled(full, choice, families, named_only=clear.clipped)
-    steady = without_shadows(FinalModel(final, families, origin, calibrator.parameters))
-    if len(steady) < len(families):
-        final, families = only(full, steady, final)
-    final, families = opened(full, families, final)
+    asked = _Asked(clear.testable, companions, imu)
+    stands = _modelled(clear.full, asked, origin, calibrator, named_only=clear.clipped)
+    # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
+    wander = None
+    if clear.fault is None:
+        wander = wandering(
+            stands.full, stands.families, stands.final, origin, calibrator.parameters
+        )
+    if wander is not None:
+        stands = _beside_wander(stands, wander, asked, origin, calibrator, clear)
     return Judge(
         calibrator,
         imu,
         Evidence(
-            full,
-            choice,
-            final,
-            tuple(families),
-            rivals,
+            stands.full,
+            stands.choice,
+            stands.final,
+            tuple(stands.families),
+            stands.rivals,
             companions,
             believed(clear.sampled, calibrator.trust.refusals),
-            _unused(calibrator, imu, (clear, flight), final, origin.t0),
+            _unused(calibrator, imu, (clear, flight), stands.final, origin.t0),
             clear.as_sampled,
             clear.clipped,
         ),
@@ -113,6 +114,60 @@ def examine(
         clear.absent,
         tuple(e for e in clear.seen if e is not None),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Stands:
+    """A model that was chosen: from which sums, beside what, and what could be said instead."""
+
+    full: Examination
+    choice: Choice
+    rivals: Mapping[str, Sequence[str]]
+    final: Examination
+    families: list[Effect]
+
+
+def _modelled(
+    begun: Examination,
+    asked: _Asked,
+    origin: Origin,
+    calibrator: Calibrator,
+    *,
+    named_only: bool,
+) -> _Stands:
+    """The model that a flight with every column of the catalogue asks for."""
+    full, choice = _selected(begun, asked, origin)
+    if full is not begun:
+        begun.let_sums_go()
+    rivals = compared(choice, full, calibrator, asked.imu)
+    final, families = settled(full, choice, families_of(choice), named_only=named_only)
+    steady = without_shadows(FinalModel(final, families, origin, calibrator.parameters))
+    if len(steady) < len(families):
+        final, families = only(full, steady, final)
+    final, families = opened(full, families, final)
+    return _Stands(full, choice, rivals, final, families)
+
+
+def _beside_wander(
+    stands: _Stands,
+    found: Wandering,
+    asked: _Asked,
+    origin: Origin,
+    calibrator: Calibrator,
+    clear: Cleared,
+) -> _Stands:
+    """The model with an offset that wanders.
+
+    What was chosen without it is chosen anew where it does not stand, or does not explain all.
+    """
+    families = [*found.kept, found.wander]
+    if found.settled:
+        return replace(stands, final=found.made, families=families)
+    full = stands.full.carrying(found.wander, tuned=False)
+    other = _modelled(full, asked, origin, calibrator, named_only=clear.clipped)
+    if not still_wanders(other.final, found.wander):
+        return stands
+    return replace(other, families=[*other.families, found.wander])
 
 
 def _unused(

@@ -61,7 +61,7 @@ def _pruned(
     full: Examination, families: list[Effect], final: Examination
 ) -> tuple[Examination, list[Effect]]:
     """The model without families that are not needed beside the others."""
-    kept = _needed(final, families)
+    kept = needed_beside(final, families)
     if len(kept) == len(families):
         return final, families
     return only(full, kept, final)
@@ -117,8 +117,8 @@ def _again(full: Examination, families: Sequence[Effect], final: Examination) ->
     )
 
 
-def _needed(made: Examination, families: Sequence[Effect]) -> list[Effect]:
-    """Families that still count as found when all of them are in one model."""
+def needed_beside(made: Examination, families: Sequence[Effect]) -> list[Effect]:
+    """Families that still count as found beside each other and all else that is in one model."""
     fitter = Fitter(made.all_blocks, made.model, made.absent)
     kept = list(families)
     base = [i for i in range(made.model.size) if i not in set(made.indices_of(families))]

@@ -284,6 +284,23 @@ class Effect(Family):
         """
         return line
 
+    def sized(self, theta: Array, covariance: Array) -> dict[str, Quantity]:
+        """What is said of its size, by :attr:`keys`: there are none for the shapes after them.
+
+        Args:
+            theta: (k,) its unknowns.
+            covariance: (k, k) of them.
+        """
+        sigma = np.sqrt(np.diag(covariance))
+        return {
+            key: Quantity(float(theta[i]), float(sigma[i]), self.unknowns[i].unit)
+            for i, key in enumerate(self.keys)
+        }
+
+    def unsteady(self) -> Array:
+        """(3,) variance by which offsets of another flight differ, body axes, (m/s^2)^2."""
+        return np.zeros(3)
+
     def formula(self, sizes: Sequence[float]) -> str:  # noqa: ARG002 - only nameless ones have one
         """What is written where there is no name; empty otherwise."""
         return ""

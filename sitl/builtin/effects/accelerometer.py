@@ -141,6 +141,36 @@ class ScaleStep(ByAxis):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OffsetWander(ByAxis):
+    """Flicker noise of the offset, of bias instability ``(x, y, z)``, m/s^2.
+
+    Relaxations of every octave from 2 s to an hour, each of the variance ``B^2 ln 2 / pi``, have
+    together the density of flicker noise (McWhorter).
+    """
+
+    name: ClassVar[str] = "offset_wander"
+    kind: ClassVar[str] = "offset in time"
+    seed: int = 0
+
+    def reads_too_much(self, scene: Scene) -> Array:
+        """(n, 3) m/s^2."""
+        step = 0.1
+        lasting = 2.0 ** np.arange(1, 13)
+        kept = np.exp(-step / lasting)[:, None]
+        sigma = np.sqrt(np.log(2.0) / np.pi) * self.sizes
+        chance = np.random.default_rng(self.seed)
+        t = np.arange(scene.elapsed[0], scene.elapsed[-1] + 2.0 * step, step)
+        x = sigma * chance.standard_normal((len(lasting), 3))
+        rows = []
+        for _ in t:
+            rows.append(x.sum(axis=0))
+            fresh = chance.standard_normal(x.shape)
+            x = kept * x + np.sqrt(1.0 - kept**2) * sigma * fresh
+        off = np.array(rows)
+        return np.stack([np.interp(scene.elapsed, t, off[:, i]) for i in range(3)], axis=-1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScaleNonlinearity(ByAxis):
     """``f_i += c_i f_i^2 / g``, c in 1/g."""
 

@@ -16,6 +16,7 @@ from onboard.core.physics.catalogue import catalogue, kinds, phrase_of, size_of,
 from onboard.core.physics.effect import STATEMENTS, Bearing, Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
 from onboard.core.physics.effects.empirical import Empirical
+from onboard.core.physics.effects.offset_wander import OffsetWander
 from onboard.core.physics.effects.scale_step import ScaleStep
 from onboard.core.physics.finding import Finding, Quantity
 from onboard.errors import OnboardError
@@ -27,12 +28,14 @@ every = pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.effect)
 
 
 def placed(kind):
-    """The effect as a candidate: a jump has its moment, a formula its signal."""
+    """The effect as a candidate: a jump has its moment, a formula its signal, a wander a flight."""
     effect = kind(ORIGIN)
     if isinstance(effect, BiasStep | ScaleStep):
         return effect.at(40.0, sigma=0.5)
     if isinstance(effect, Empirical):
         return effect.of("one", "1", lambda nodes: np.ones(nodes.t.shape))
+    if isinstance(effect, OffsetWander):
+        return effect.along(0.0, 100.0, np.full(3, 0.1), 4)
     return effect
 
 
@@ -94,11 +97,11 @@ def test_its_unknowns_have_names_units_bounds_and_priors(kind):
     assert set(kind.needs) <= set(SLOW_SIGNALS)
 
 
-@pytest.mark.parametrize("kind", [BiasStep, ScaleStep, Empirical])
+@pytest.mark.parametrize("kind", [BiasStep, ScaleStep, Empirical, OffsetWander])
 def test_what_has_no_moment_and_no_formula_yet_is_in_no_model(kind):
     with pytest.raises(OnboardError, match=kind.effect):
         Model([kind(ORIGIN)])
-    assert Model([placed(kind)]).size == 3
+    assert Model([placed(kind)]).size == len(placed(kind).unknowns) > 0
 
 
 def test_those_of_every_model_know_what_nothing_is():
