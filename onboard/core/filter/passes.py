@@ -148,7 +148,7 @@ class Pass:
             skipped = _first_believed(fixes, trusted)
             if len(fixes) - skipped < 2:
                 at = float(fixes.t[-1])
-                return PassResult(Block(at, at, NormalSums.zeros(self.model.size)))
+                return PassResult(Block(at, at, self.counted(NormalSums.zeros(self.model.size))))
         made = self._made_ready(Source(segment, fixes, trusted, self._before, skipped))
         self._before, ready = made.segment, made.ready
         if not self._running:
@@ -164,8 +164,12 @@ class Pass:
         block = sums.member(0)
         if self.filter.noise_gram is not None:
             self._noise_in_regressors(block, segment, self.filter.noise_gram)
-        result.block = Block(ready.start, ready.end, block)
+        result.block = Block(ready.start, ready.end, self.counted(block))
         return result
+
+    def counted(self, sums: NormalSums) -> NormalSums:
+        """What of the sums of a segment its block has."""
+        return sums
 
     def _made_ready(self, source: Source) -> Kept:
         """The segment with its regressors, from another pass or made now."""
