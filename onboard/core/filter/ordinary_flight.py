@@ -49,6 +49,7 @@ class Gone(NamedTuple):
         rows: (B, r, m + 1) the innovations: ``y``, then ``h``.
         raw: (r, m + 1) those of member 0 before whitening.
         log_var: (B, r) log variances of each before whitening.
+        left: (B, r) what the estimate leaves of ``rows``.
         states: (n, 15) velocity innovation (3, NaN where there is none), attitude (9) and velocity
             (3) after each epoch.
     """
@@ -62,6 +63,7 @@ class Gone(NamedTuple):
     rows: Array
     raw: Array
     log_var: Array
+    left: Array
     states: Array
 
     @property
@@ -113,10 +115,12 @@ class OrdinaryFlight:
         self._rows = np.empty((len(made.bank), most, m1))
         self._raw = np.empty((most, m1))
         self._log_var = np.empty((len(made.bank), most))
+        self._left = np.empty((len(made.bank), most))
         self._taken = np.empty(n, dtype=np.int64)
         self._states = np.empty((n, 15))
         self._ends = np.ascontiguousarray(ready.measured, dtype=np.int64)
-        self._noted = (self._rows, self._raw, self._log_var, self._taken, self._states)
+        written = self._rows, self._raw, self._log_var, self._left
+        self._noted = (*written, self._taken, self._states)
 
     def go(self, step: int, theta: Array, uncertainty: Uncertainty, most: int) -> Gone:
         """Go on from a step (its number) until ``most`` epochs are taken or one is not ordinary.
@@ -204,6 +208,7 @@ class OrdinaryFlight:
             self._rows[:, :rows],
             self._raw[:rows],
             self._log_var[:, :rows],
+            self._left[:, :rows],
             self._states[:count],
         )
 

@@ -237,7 +237,7 @@ class Pass:
         if made is None:
             return
         sums.add(made.y, made.h, made.log_det)
-        self._compare(made.y, made.h, made.log_var)
+        self._compare(made.y - made.h @ self.theta, made.log_var)
         k = made.velocities + made.height
         self.of_fixes.add(made.y[:1, :k], made.h[:1, :k], made.log_var[:1, :k].sum(axis=1))
         self._note(made, result)
@@ -251,7 +251,7 @@ class Pass:
             return
         result.epochs += len(gone.epochs)
         sums.add_rows(gone.rows, gone.log_var.sum(axis=1))
-        self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_var)
+        self._compare(gone.left, gone.log_var)
         of_fixes = gone.of_fixes
         self.of_fixes.add_rows(gone.rows[:1, of_fixes], gone.log_var[:1, of_fixes].sum(axis=1))
         with_velocity = gone.epochs[gone.velocities > 0]
@@ -263,13 +263,11 @@ class Pass:
             result.states.append(gone.noted(ready.epochs, self.bias_b))
         self._estimate(sums, len(gone.epochs))
 
-    def _compare(self, y: Array, h: Array, log_var: Array) -> None:
-        """Add to :attr:`trades` what innovations (B, r), with log variances (B, r), show of it."""
-        if len(y) == 1:
+    def _compare(self, left: Array, log_var: Array) -> None:
+        """Add to :attr:`trades` what is ``left`` of innovations (B, r), with log variances."""
+        if len(left) == 1:
             return
-        e, s = y - h @ self.theta, log_var / 2.0
-        e -= e[0].copy()
-        s = s - s[0]
+        e, s = left - left[0], (log_var - log_var[0]) / 2.0
         self.trades += e @ e.T + s @ s.T
 
     def _note(self, made: WhitenedInnovations, result: PassResult) -> None:

@@ -72,7 +72,16 @@ def _sum(
 
 @part
 def _keep(
-    W: Array, E: Array, var: Array, r: int, at: int, rows: Array, raw: Array, log_var: Array
+    W: Array,
+    E: Array,
+    var: Array,
+    theta: Array,
+    r: int,
+    at: int,
+    rows: Array,
+    raw: Array,
+    log_var: Array,
+    left: Array,
 ) -> None:
     """Write down the r innovations of an epoch from row ``at`` on."""
     m1 = E.shape[1]
@@ -81,6 +90,10 @@ def _keep(
             log_var[b, at + a] = var[b, a]
             for c in range(m1):
                 rows[b, at + a, c] = W[b, a, c]
+            x = W[b, a, 0]
+            for c in range(len(theta)):
+                x -= W[b, a, c + 1] * theta[c]
+            left[b, at + a] = x
     for a in range(r):
         for c in range(m1):
             raw[at + a, c] = E[a, c]
@@ -113,7 +126,8 @@ def _note(
     " f8[:,:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:],"
     " f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1],"
     " f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1],"
-    " i8, f8[::1], f8, i8, i8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
+    " i8, f8[::1], f8, i8, i8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8[::1],"
+    " f8[:,::1])"
 )
 def run(
     carried: Array,
@@ -159,6 +173,7 @@ def run(
     rows: Array,
     raw: Array,
     log_var: Array,
+    left: Array,
     taken: Index,
     states: Array,
 ) -> int:
@@ -211,6 +226,7 @@ def run(
         rows: (B, .., m + 1) whitened innovations are written to.
         raw: (.., m + 1) those of member 0 before whitening.
         log_var: (B, ..) logarithms of their variances before whitening.
+        left: (B, ..) what ``theta`` leaves of them.
         taken: (n,) epochs that were taken, in order, are written to.
         states: (n, 15) velocity innovation, attitude and velocity after each of them.
 
@@ -280,7 +296,7 @@ def run(
         if progress[3] % symmetry == 0:
             _symmetric(carried, m1)
         at, n = progress[1], progress[2]
-        _keep(W, E, var, r, at, rows, raw, log_var)
+        _keep(W, E, var, theta, r, at, rows, raw, log_var, left)
         taken[n] = e
         _note(carried, R_nb, E, offered[e, 0], theta, states[n])
         progress[0], progress[1], progress[2] = k + 1, at + r, n + 1
