@@ -184,6 +184,11 @@ class BankSums:
         """(B,)."""
         return self._added()[:, 0, 0]
 
+    def products(self, i: int) -> Array:
+        """(m + 1, m + 1) of one member: of ``y`` (first) and ``h`` with all of these."""
+        out: Array = self._added()[i]
+        return out
+
     def add(self, y: Array, h: Array, log_det: Array) -> None:
         """Add whitened innovations.
 
