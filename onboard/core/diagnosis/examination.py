@@ -17,6 +17,7 @@ from onboard.core.estimate.approach import worth
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.going_through import through
 from onboard.core.estimate.solution import Solution, limited, noise_matters, solve
+from onboard.core.filter.accompanied import AccompaniedPass
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.noisy_pass import NoisyPass
@@ -27,9 +28,10 @@ from onboard.core.filter.traces import EpochTrace, PassResult, Traces
 from onboard.core.filter.whitening import Uses
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.sums import NormalSums
 from onboard.core.model.ekf_misled import EkfJumped
 from onboard.core.model.linearisation import Linearisation
-from onboard.core.model.regressors import Family
+from onboard.core.model.regressors import Family, Model
 from onboard.core.physics.effect import Effect
 from onboard.core.physics.effects.bias_step import BiasStep
 
@@ -78,6 +80,7 @@ class Examination(Engine):
         self.traced = traced
         self.traces = Traces()
         self._refused: Refused | None = None
+        self._beside: Family | None = None
         answers = _answers((*families, *self.carried), like.settings.needs.prior_offset)
         super().__init__(
             replace(like.settings, refine=True),
@@ -164,12 +167,34 @@ class Examination(Engine):
         ready: Preparations | None = None,
     ) -> Pass:
         """As there; noise is carried through all that is made of samples where it matters."""
-        if not self.noisy or members is not None:
+        if members is not None or not (self.noisy or self._beside):
             return super()._new_pass(members, ready)
-        made = NoisyPass(self.model, self.point, self.noise, self.uses)
+        made = self._accompanied_pass()
         if self._seed is not None:
             made.hold(self.about_point(self._seed.theta), self._seed.covariance)
         return made
+
+    def _accompanied_pass(self) -> AccompaniedPass:
+        """A pass with columns beside the model's own."""
+        of = self.model, self.point, self.noise, self.uses
+        if self._beside is None:
+            return NoisyPass(*of)
+        return AccompaniedPass(self.model, Model((*self.model.families, self._beside)), *of[1:])
+
+    def accompanied(self, by: Family, batches: Sequence[Batch]) -> NormalSums:
+        """Go through the whole flight with columns beside the model's own that take no part in it.
+
+        Args:
+            by: the columns, of unknowns of sigma :data:`~onboard.core.filter.accompanied.NO_PART`.
+            batches: the same flight, with the signals that these are made of.
+
+        Returns:
+            Sums of all of it, in which these columns are behind the model's own.
+        """
+        own, self.batches, self._beside = self.batches, list(batches), by
+        self.once()
+        self.batches, self._beside = own, None
+        return self._pass.sums.member(0)
 
     def once(self, held: tuple[Array, Array] | None = None) -> None:
         """As there."""

@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from onboard.core.diagnosis.examination import Examination
-from onboard.core.diagnosis.toneless import unseen
+from onboard.core.diagnosis.limits import MOST_TONES
+from onboard.core.diagnosis.toneless import Beside, heard, unseen
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.limits import WORTH_A_SEARCH
 from onboard.core.filter.limits import LIMITS
@@ -31,7 +32,7 @@ from onboard.core.inputs.expected_force import (
     white,
 )
 from onboard.core.inputs.segments import Batch
-from onboard.core.inputs.tones import density_of, stretches_of, without
+from onboard.core.inputs.tones import Tone, density_of, stretches_of, without
 from onboard.core.maths.arrays import Array
 from onboard.core.model.noise_level import DOUBT, NoiseLevel
 from onboard.core.model.regressors import Family
@@ -57,7 +58,13 @@ class Asked:
     beside: Examination | None
 
     def examined(self, batches: Sequence[Batch], start: Examination | None = None) -> Examination:
-        """The flight with its own noise and timing, which are looked for from those of ``start``.
+        """The flight with its own noise and timing, looked for from those of ``start``."""
+        made = self.tuned(batches, start)
+        made.once()
+        return made
+
+    def tuned(self, batches: Sequence[Batch], start: Examination | None = None) -> Examination:
+        """The same without its sums yet.
 
         Else from those of the accelerometer beside it: it has flown the same flight with the same
         receiver, and a search takes a third of the passes from there.  Else from where they are
@@ -80,7 +87,7 @@ class Asked:
             made.with_rows()  # what it is linear about would pass for noise
         if start is None and self.beside is not None:
             made.begin_as(self.beside)
-        return made.with_noise()
+        return made.tuned()
 
     def levelled(
         self,
@@ -128,11 +135,10 @@ def felt(asked: Asked, batches: Sequence[Batch]) -> Examination:
     levels are looked for where it moves one of the six.  Where it only may drown what an antenna or
     a delay is told by, it is the least that white noise can be.
     """
-    sampled = asked.examined(batches)
     density = spectrum(batches)
     if density is None:
-        return sampled
-    tones = unseen(sampled, batches)
+        return asked.examined(batches)
+    sampled, tones = _listened(asked, batches)
     if tones:
         toneless = asked.examined(without(batches, tones), sampled)
         if toneless.log_likelihood > sampled.log_likelihood:
@@ -149,6 +155,16 @@ def felt(asked: Asked, batches: Sequence[Batch]) -> Examination:
     else:
         return sampled
     return max(sampled, found, key=_likelihood)
+
+
+def _listened(asked: Asked, batches: Sequence[Batch]) -> tuple[Examination, list[Tone]]:
+    """The flight as it was sampled, and tones of the samples that its receiver knows nothing of."""
+    audible, sampled, beside = heard(batches), asked.tuned(batches), None
+    if audible and not sampled.noisy:
+        beside = Beside.of(sampled, audible[:MOST_TONES])  # without a pass of their own
+    else:
+        sampled.once()
+    return sampled, unseen(sampled, audible, beside)
 
 
 def mean_walk_s(levels: NoiseLevels, batches: Sequence[Batch]) -> Array:

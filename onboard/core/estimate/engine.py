@@ -240,7 +240,7 @@ class Engine(Watched):
         Args:
             levels: whether noise levels are not told.
         """
-        if not self.batches or self._frozen:
+        if self._frozen:
             return
         self.tune(levels=levels)
         self.once()
@@ -268,6 +268,8 @@ class Engine(Watched):
         Args:
             levels: whether noise levels are not told.
         """
+        if not self.batches:
+            return
         way, ready = Approach(self.point), Preparations()
         sample = [self.batches] if self.sample is None else self.sample
         begin, names = levels_told(self.noise, (batch for part in sample for batch in part))

@@ -61,11 +61,22 @@ def share_of_gram(sums: NormalSums, prior_information: Array) -> float:
     if not np.any(G):
         return 1.0
     A = sums.N + prior_information
+    if _positive(MOST_NOISE * A - G):  # which nearly all are, and that is soon seen
+        return 1.0
     # Largest share of any direction that the noise claims.
     L = np.linalg.cholesky(A)
     scaled = np.linalg.solve(L, np.linalg.solve(L, G).T)
     share = float(np.linalg.eigvalsh((scaled + scaled.T) / 2).max())
     return 1.0 if share <= MOST_NOISE else MOST_NOISE / share
+
+
+def _positive(A: Array) -> bool:
+    """Whether a symmetric matrix has no direction in which it is zero or less."""
+    try:
+        np.linalg.cholesky(A)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def solve(blocks: Sequence[Block], model: Model) -> Solution:

@@ -46,6 +46,8 @@ def missed_between(segment: Segment, start: Array, end: Array) -> Array:
     """
     out = np.zeros((len(start), 6))
     at, axis, var = segment.once(_sudden)
+    if not len(at):
+        return out
     step = np.searchsorted(end, at)
     inside = (at >= start[0]) & (step < len(end))
     np.add.at(out, (step[inside], axis[inside]), var[inside])

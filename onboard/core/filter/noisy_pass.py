@@ -17,18 +17,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from onboard.core.filter.accompanied import NO_PART, AccompaniedPass
 from onboard.core.filter.limits import SHAKEN_LASTS_S
 from onboard.core.filter.noise import NoiseLevels
-from onboard.core.filter.passes import Pass
 from onboard.core.filter.regressor_noise import share_of_walk
 from onboard.core.filter.shaken import shaken_between, walk_s
-from onboard.core.filter.traces import PassResult
 from onboard.core.filter.whitening import Uses
-from onboard.core.inputs.segments import Fixes, Segment
+from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.blocks import Block
+from onboard.core.maths.sums import NormalSums
 from onboard.core.model.around import Around, around
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.quadrature import Intervals, NodeMaker
@@ -36,11 +34,9 @@ from onboard.core.model.regressors import Family, Model, SegmentRegressors, Unkn
 
 MADE_OF_SAMPLES = ("six", "gps_latency", "gps_smoothing")
 """Families of every model whose regressors are made of the samples of the force."""
-NOTHING = 1e-9
-"""Sigma of what takes no part, in whatever unit: no flight knows anything as well [cost]."""
 
 
-class NoisyPass(Pass):
+class NoisyPass(AccompaniedPass):
     """A pass of one member whose sums know what of them is noise in the regressors."""
 
     carries_walk = False
@@ -53,28 +49,15 @@ class NoisyPass(Pass):
         uses: Uses | None = None,
     ) -> None:
         """Take what a :class:`~onboard.core.filter.passes.Pass` of one member takes."""
-        self._own = model.size
         wide = _WithNoise(model, point, levels)
         self._noisy = wide.noisy
-        super().__init__(wide, point, (levels,), uses=uses)
+        super().__init__(model, wide, point, levels, uses=uses)
 
-    def hold(self, theta: Array, covariance: Array) -> None:
-        """As there, of the model's own m unknowns."""
-        wide, spread = np.zeros(self.model.size), np.zeros((self.model.size, self.model.size))
-        wide[: self._own], spread[: self._own, : self._own] = theta, covariance
-        super().hold(wide, spread)
-
-    def process(self, segment: Segment, fixes: Fixes, trusted: NDArray[np.bool_]) -> PassResult:
-        """As there; sums and traces are of the model's own unknowns."""
-        result = super().process(segment, fixes, trusted)
-        block, m = result.block, self._own
-        sums = block.sums
-        own = sums.subset(range(m))
-        own.G[:] = 0.0
+    def counted(self, sums: NormalSums) -> NormalSums:
+        """As there, with what the columns of noise came out with."""
+        own, m = super().counted(sums), self.own
         own.G[np.ix_(self._noisy, self._noisy)] = sums.N[m:, m:]
-        result.block = Block(block.start, block.end, own)
-        result.traces.keep_first(m)
-        return result
+        return own
 
 
 class _Noise(Family):
@@ -83,7 +66,7 @@ class _Noise(Family):
     name = "noise"
 
     def __init__(self, count: int) -> None:
-        self.unknowns = tuple(Unknown(f"noise_{i}", "1", 0.0, NOTHING) for i in range(count))
+        self.unknowns = tuple(Unknown(f"noise_{i}", "1", 0.0, NO_PART) for i in range(count))
 
 
 class _WithNoise(Model):

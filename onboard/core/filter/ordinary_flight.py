@@ -22,8 +22,9 @@ from onboard.core.filter.limits import (
 )
 from onboard.core.filter.prepared import Prepared
 from onboard.core.filter.readings import Index
+from onboard.core.filter.running_estimate import RunningEstimate
 from onboard.core.filter.traces import Traces
-from onboard.core.filter.uncertainty import Covariance, Uncertainty
+from onboard.core.filter.uncertainty import Covariance, Information
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
@@ -49,6 +50,7 @@ class Gone(NamedTuple):
         rows: (B, r, m + 1) the innovations: ``y``, then ``h``.
         raw: (r, m + 1) those of member 0 before whitening.
         log_var: (B, r) log variances of each before whitening.
+        left: (B, r) what the estimate leaves of ``rows``.
         states: (n, 15) velocity innovation (3, NaN where there is none), attitude (9) and velocity
             (3) after each epoch.
     """
@@ -62,6 +64,7 @@ class Gone(NamedTuple):
     rows: Array
     raw: Array
     log_var: Array
+    left: Array
     states: Array
 
     @property
@@ -113,19 +116,19 @@ class OrdinaryFlight:
         self._rows = np.empty((len(made.bank), most, m1))
         self._raw = np.empty((most, m1))
         self._log_var = np.empty((len(made.bank), most))
+        self._left = np.empty((len(made.bank), most))
         self._taken = np.empty(n, dtype=np.int64)
         self._states = np.empty((n, 15))
         self._ends = np.ascontiguousarray(ready.measured, dtype=np.int64)
-        self._noted = (self._rows, self._raw, self._log_var, self._taken, self._states)
+        written = self._rows, self._raw, self._log_var, self._left
+        self._noted = (*written, self._taken, self._states)
 
-    def go(self, step: int, theta: Array, uncertainty: Uncertainty, most: int) -> Gone:
-        """Go on from a step (its number) until ``most`` epochs are taken or one is not ordinary.
+    def go(self, step: int, estimate: RunningEstimate) -> Gone:
+        """Go on from a step until one is not ordinary.
 
         Args:
-            step: number of the first step.
-            theta: (m,) estimate.
-            uncertainty: how well it is known.
-            most: epochs.
+            step: its number.
+            estimate: that gates and attitude follow; written to.
 
         Raises:
             numpy.linalg.LinAlgError: a covariance is not positive.
@@ -134,13 +137,21 @@ class OrdinaryFlight:
         progress = np.array([step, 0, 0, made.updates])
         made.R_nb = np.array(made.R_nb)
         levels, gram = made.variances, made.noise_gram
+        known = estimate.uncertainty.matrix
+        known = np.ascontiguousarray(known) if estimate.held else known.copy()
+        form = np.array([int(not isinstance(estimate.uncertainty, Covariance))])
         pending = self._run(
             made.carried,
             made.R_nb,
             progress,
-            most,
             SYMMETRY_UPDATES,
-            np.ascontiguousarray(theta),
+            np.ascontiguousarray(estimate.theta),
+            int(estimate.held),
+            known,
+            form,
+            estimate.summed,
+            estimate.prior,
+            estimate.counted,
             steps.duration,
             steps.turn,
             steps.moved,
@@ -168,8 +179,6 @@ class OrdinaryFlight:
             levels.stated,
             levels.shaken,
             _TAILS,
-            np.ascontiguousarray(uncertainty.matrix),
-            int(not isinstance(uncertainty, Covariance)),
             np.array([made.t - made.taken_t]),
             STANDARD_GRAVITY,
             int(made.uses.earth),
@@ -177,6 +186,10 @@ class OrdinaryFlight:
             np.zeros(3) if gram is None else gram,
             *self._noted,
         )
+        if estimate.held:
+            estimate.count(int(progress[2]))
+        elif form[0]:
+            estimate.uncertainty = Information(known)
         if pending == _NO_COVARIANCE:
             raise np.linalg.LinAlgError("the covariance of the innovations is not positive")
         return self._gone(step, progress, pending=bool(pending))
@@ -204,6 +217,7 @@ class OrdinaryFlight:
             self._rows[:, :rows],
             self._raw[:rows],
             self._log_var[:, :rows],
+            self._left[:, :rows],
             self._states[:count],
         )
 

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.filter.innovations import Epoch, WhitenedInnovations
-from onboard.core.filter.limits import EAGER_EPOCHS, HEADING_START_RAD, LAZY_EPOCHS, TILT_START_RAD
+from onboard.core.filter.limits import HEADING_START_RAD, TILT_START_RAD
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.filter.ordinary_flight import Gone, ordinary_flight
 from onboard.core.filter.preparations import Kept, Preparations, Source
 from onboard.core.filter.prepared import Prepared, prepare
 from onboard.core.filter.regressor_noise import share_of_walk
+from onboard.core.filter.running_estimate import RunningEstimate
 from onboard.core.filter.shaken import walk_s
 from onboard.core.filter.traces import EpochState, PassResult, Traces, state_row
-from onboard.core.filter.uncertainty import Covariance, Information, Uncertainty
 from onboard.core.filter.whitening import Uses, WhiteningFilter
 from onboard.core.inputs.segments import Fixes, Segment
 from onboard.core.maths.arrays import Array
@@ -68,13 +67,11 @@ class Pass:
         """Whether traces have all that was whitened."""
         self.keep_states = True
         """Whether the filter's state is kept after each epoch."""
-        self._held = theta is not None
-        self._information = np.diag(1.0 / model.prior_sigma**2)
-        self._prior_b = self._information @ model.prior
-        self.theta = model.prior.copy() if theta is None else theta
-        self.uncertainty: Uncertainty = Covariance(
-            np.diag(model.prior_sigma**2) if covariance is None else covariance
-        )
+        self.estimate = RunningEstimate(model)
+        """That gates and attitude follow."""
+        if theta is not None:
+            prior = np.diag(model.prior_sigma**2)
+            self.estimate.hold(theta, prior if covariance is None else covariance)
         self.sums = BankSums(len(bank), model.size)
         """Of all segments that are finished."""
         self.of_fixes = BankSums(1, model.size)
@@ -86,9 +83,12 @@ class Pass:
         self._preparations = preparations
         self._running = False
         self._before: Segment | None = None
-        self._since_solve = 0
-        self._epochs = 0
         self._last_velocity_t = -np.inf
+
+    @property
+    def theta(self) -> Array:
+        """(m,) estimate that gates and attitude follow."""
+        return self.estimate.theta
 
     @property
     def running(self) -> bool:
@@ -107,11 +107,11 @@ class Pass:
 
     def hold(self, theta: Array, covariance: Array) -> None:
         """Gates and feedback follow this estimate (m,), (m, m) until :meth:`release`."""
-        self.theta, self.uncertainty, self._held = theta, Covariance(covariance), True
+        self.estimate.hold(theta, covariance)
 
     def release(self) -> None:
         """From now on gates and feedback follow the pass's own sums."""
-        self._held = False
+        self.estimate.follow(self.sums.products(0))
 
     def log_likelihoods(self) -> list[float]:
         """Log-likelihood of each member, the unknowns integrated out with their prior."""
@@ -148,7 +148,7 @@ class Pass:
             skipped = _first_believed(fixes, trusted)
             if len(fixes) - skipped < 2:
                 at = float(fixes.t[-1])
-                return PassResult(Block(at, at, NormalSums.zeros(self.model.size)))
+                return PassResult(Block(at, at, self.counted(NormalSums.zeros(self.model.size))))
         made = self._made_ready(Source(segment, fixes, trusted, self._before, skipped))
         self._before, ready = made.segment, made.ready
         if not self._running:
@@ -164,8 +164,12 @@ class Pass:
         block = sums.member(0)
         if self.filter.noise_gram is not None:
             self._noise_in_regressors(block, segment, self.filter.noise_gram)
-        result.block = Block(ready.start, ready.end, block)
+        result.block = Block(ready.start, ready.end, self.counted(block))
         return result
+
+    def counted(self, sums: NormalSums) -> NormalSums:
+        """What of the sums of a segment its block has."""
+        return sums
 
     def _made_ready(self, source: Source) -> Kept:
         """The segment with its regressors, from another pass or made now."""
@@ -210,7 +214,7 @@ class Pass:
         while k < len(ends):
             begun = False
             if ordinary is not None and self.filter.calm:
-                gone = ordinary.go(k, self.theta, self.uncertainty, self._until_solved)
+                gone = ordinary.go(k, self.estimate)
                 self._note_all(gone, ready, result, sums)
                 k, begun = gone.step, gone.pending
                 if not begun:
@@ -228,18 +232,18 @@ class Pass:
         """Take what an epoch measured, whatever it is."""
         if self.uses.recorded_attitude:
             self.filter.R_nb = self.point.attitude(segment, np.array([epoch.t]))[0][0]
-        made = self.filter.update(epoch, self.theta, self.uncertainty)
+        made = self.filter.update(epoch, self.theta, self.estimate.uncertainty)
         result.epochs += 1
         if made is None:
             return
         sums.add(made.y, made.h, made.log_det)
-        self._compare(made.y, made.h, made.log_var)
+        self._compare(made.y - made.h @ self.theta, made.log_var)
         k = made.velocities + made.height
         self.of_fixes.add(made.y[:1, :k], made.h[:1, :k], made.log_var[:1, :k].sum(axis=1))
         self._note(made, result)
         if made.velocities and self.keep_states:
             result.states.append(state_row(self._state(made)))
-        self._estimate(sums)
+        self.estimate.add(made.y[0], made.h[0])
 
     def _note_all(self, gone: Gone, ready: Prepared, result: PassResult, sums: BankSums) -> None:
         """What :meth:`_at_epoch` does, for all epochs that were gone through at once."""
@@ -247,7 +251,7 @@ class Pass:
             return
         result.epochs += len(gone.epochs)
         sums.add_rows(gone.rows, gone.log_var.sum(axis=1))
-        self._compare(gone.rows[:, :, 0], gone.rows[:, :, 1:], gone.log_var)
+        self._compare(gone.left, gone.log_var)
         of_fixes = gone.of_fixes
         self.of_fixes.add_rows(gone.rows[:1, of_fixes], gone.log_var[:1, of_fixes].sum(axis=1))
         with_velocity = gone.epochs[gone.velocities > 0]
@@ -257,15 +261,12 @@ class Pass:
             gone.traced(ready.epochs, result.traces, whole=self.keep_rows)
         if self.keep_states:
             result.states.append(gone.noted(ready.epochs, self.bias_b))
-        self._estimate(sums, len(gone.epochs))
 
-    def _compare(self, y: Array, h: Array, log_var: Array) -> None:
-        """Add to :attr:`trades` what innovations (B, r), with log variances (B, r), show of it."""
-        if len(y) == 1:
+    def _compare(self, left: Array, log_var: Array) -> None:
+        """Add to :attr:`trades` what is ``left`` of innovations (B, r), with log variances."""
+        if len(left) == 1:
             return
-        e, s = y - h @ self.theta, log_var / 2.0
-        e -= e[0].copy()
-        s = s - s[0]
+        e, s = left - left[0], (log_var - log_var[0]) / 2.0
         self.trades += e @ e.T + s @ s.T
 
     def _note(self, made: WhitenedInnovations, result: PassResult) -> None:
@@ -281,29 +282,6 @@ class Pass:
             if self.keep_rows:
                 rows = np.column_stack([made.y[0], made.h[0]])
                 result.traces.add_rows(rows, height=made.height)
-
-    @property
-    def _until_solved(self) -> int:
-        """Epochs until the sums are solved."""
-        if self._held:
-            return sys.maxsize
-        return max(1, self._due(self._epochs + 1) - self._since_solve)
-
-    @staticmethod
-    def _due(epochs: int) -> int:
-        """After how many epochs sums are solved again, when so many are in."""
-        return 1 if epochs < EAGER_EPOCHS else LAZY_EPOCHS
-
-    def _estimate(self, block: BankSums, epochs: int = 1) -> None:
-        """Solve the sums so far, ``block`` with ``epochs`` more included, now and then."""
-        self._epochs += epochs
-        self._since_solve += epochs
-        if self._held or self._since_solve < self._due(self._epochs):
-            return
-        self._since_solve = 0
-        known = self.sums.N[0] + block.N[0] + self._information
-        self.theta = np.linalg.solve(known, self.sums.b[0] + block.b[0] + self._prior_b)
-        self.uncertainty = Information(known)
 
     def _state(self, made: WhitenedInnovations) -> EpochState:
         innovation = np.full(3, np.nan)

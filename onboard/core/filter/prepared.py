@@ -111,6 +111,9 @@ def _subdivide(epoch_t: Array) -> tuple[Array, Array, NDArray[np.int_], NDArray[
     The third is the same epoch (K,), but -1 where other steps follow before it is measured.
     """
     gap = np.diff(epoch_t)
+    if gap.max() <= LONGEST_STEP_S:  # as nearly all are
+        next_ = np.arange(1, len(epoch_t))
+        return epoch_t[:-1], epoch_t[1:], next_, next_
     parts = np.maximum(np.ceil(gap / LONGEST_STEP_S), 1.0).astype(int)
     k = np.repeat(np.arange(len(gap)), parts)
     part = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)

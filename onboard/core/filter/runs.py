@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from onboard.core.filter.estimate_loops import add_to_estimate
 from onboard.core.filter.limits import LEAST_VELOCITY_VAR
 from onboard.core.filter.loops import measured, take, take_noise, whiten
 from onboard.core.filter.motion import angle_of, carry, mean, turn_by
 from onboard.core.filter.readings import Index
 from onboard.core.filter.state import MEASURED, STATES
-from onboard.core.filter.tail_loops import NOTHING, UNTOLD, tails_of, widen
+from onboard.core.filter.tail_loops import BY_INFORMATION, NOTHING, UNTOLD, tails_of, widen
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.compiler import compiled, part
 
@@ -72,7 +73,16 @@ def _sum(
 
 @part
 def _keep(
-    W: Array, E: Array, var: Array, r: int, at: int, rows: Array, raw: Array, log_var: Array
+    W: Array,
+    E: Array,
+    var: Array,
+    theta: Array,
+    r: int,
+    at: int,
+    rows: Array,
+    raw: Array,
+    log_var: Array,
+    left: Array,
 ) -> None:
     """Write down the r innovations of an epoch from row ``at`` on."""
     m1 = E.shape[1]
@@ -81,6 +91,10 @@ def _keep(
             log_var[b, at + a] = var[b, a]
             for c in range(m1):
                 rows[b, at + a, c] = W[b, a, c]
+            x = W[b, a, 0]
+            for c in range(len(theta)):
+                x -= W[b, a, c + 1] * theta[c]
+            left[b, at + a] = x
     for a in range(r):
         for c in range(m1):
             raw[at + a, c] = E[a, c]
@@ -109,19 +123,26 @@ def _note(
 
 
 @compiled(
-    "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, i8, f8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
+    "i8(f8[:,:,::1], f8[:,::1], i8[::1], i8, f8[::1], i8, f8[:,::1], i8[::1], f8[:,::1],"
+    " f8[:,::1], i8[::1], f8[::1], f8[:,:,::1], f8[:,:,::1],"
     " f8[:,:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], i8[::1], i8[:,::1], f8[:,:,:],"
     " f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1],"
-    " f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1],"
-    " i8, f8[::1], f8, i8, i8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8[::1], f8[:,::1])"
+    " f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1],"
+    " f8[::1], f8, i8, i8, f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8[::1],"
+    " f8[:,::1])"
 )
 def run(
     carried: Array,
     R_nb: Array,
     progress: Index,
-    most: int,
     symmetry: int,
     theta: Array,
+    held: int,
+    known: Array,
+    form: Index,
+    summed: Array,
+    prior: Array,
+    counted: Index,
     duration: Array,
     turn: Array,
     moved: Array,
@@ -149,8 +170,6 @@ def run(
     powers: Array,
     shares: Array,
     tails: Array,
-    known: Array,
-    form: int,
     since: Array,
     gravity: float,
     earth: int,
@@ -159,6 +178,7 @@ def run(
     rows: Array,
     raw: Array,
     log_var: Array,
+    left: Array,
     taken: Index,
     states: Array,
 ) -> int:
@@ -169,9 +189,15 @@ def run(
         R_nb: (3, 3) attitude.
         progress: (4,) the step to go on with; numbers that were read; epochs that were taken;
             updates so far.
-        most: epochs to take.
         symmetry: updates after which covariances are made symmetric.
         theta: (m,) estimate.
+        held: whether it stays; else it, ``known`` and ``form`` are written to.
+        known: (m, m) how well it is known: by its covariance, or by its information.
+        form: (1,) which of the two, as of :mod:`~..tail_loops`.
+        summed: (m + 1, m + 1) and prior and counted as in
+            :class:`~..running_estimate.RunningEstimate`.
+        prior: see there.
+        counted: see there.
         duration: (K,), turn, moved, columns, missed and shaken as in :class:`~..innovations.Steps`.
         turn: see there.
         moved: see there.
@@ -201,8 +227,6 @@ def run(
         powers: (B, 2) of ``stated`` with which the velocity's variances go.
         shares: (B, 3) as ``shaken`` of :class:`~..variances.Variances`.
         tails: (4,) by degrees of freedom.
-        known: (m, m) how well the estimate is known: by its covariance, or by its information.
-        form: which of the two, as of :mod:`~..tail_loops`.
         since: (1,) s since something of an epoch was taken.
         gravity: m/s^2.
         earth: whether it turns.
@@ -211,6 +235,7 @@ def run(
         rows: (B, .., m + 1) whitened innovations are written to.
         raw: (.., m + 1) those of member 0 before whitening.
         log_var: (B, ..) logarithms of their variances before whitening.
+        left: (B, ..) what ``theta`` leaves of them.
         taken: (n,) epochs that were taken, in order, are written to.
         states: (n, 15) velocity innovation, attitude and velocity after each of them.
 
@@ -220,11 +245,11 @@ def run(
     """
     members, _, width = carried.shape
     m1 = columns.shape[2]
-    turned, stop = np.zeros(3), progress[2] + most
+    turned = np.zeros(3)
     E, W = np.empty((MEASURED, m1)), np.empty((members, MEASURED, width))
     whitener, var = np.zeros((MEASURED, MEASURED)), np.empty((members, MEASURED))
     factor = np.empty(4)
-    while progress[0] < len(duration) and progress[2] < stop:
+    while progress[0] < len(duration):
         k = progress[0]
         e = ends[k]
         carry(
@@ -265,7 +290,7 @@ def run(
         reads = _sum(white, noise[e], jitter, moving[e], powers, stated[e])
         if whiten(carried, z, number, reads, E, W, whitener, var):
             return 1
-        tail = tails_of(W, theta, offered[e], tails, known, form, factor)
+        tail = tails_of(W, theta, offered[e], tails, known, form[0], factor)
         if tail == UNTOLD:
             return 1
         if tail != NOTHING:
@@ -280,8 +305,10 @@ def run(
         if progress[3] % symmetry == 0:
             _symmetric(carried, m1)
         at, n = progress[1], progress[2]
-        _keep(W, E, var, r, at, rows, raw, log_var)
+        _keep(W, E, var, theta, r, at, rows, raw, log_var, left)
         taken[n] = e
         _note(carried, R_nb, E, offered[e, 0], theta, states[n])
+        if not held and add_to_estimate(W, r, theta, known, summed, prior, counted):
+            form[0] = BY_INFORMATION
         progress[0], progress[1], progress[2] = k + 1, at + r, n + 1
     return 0

@@ -16,6 +16,7 @@ from onboard.core.filter.limits import SHAKEN_LASTS_S, SHAKEN_MEAN_S
 from onboard.core.filter.noise import NoiseLevels
 from onboard.core.inputs.segments import Segment
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.interpolation import straight
 
 
 def shaken_between(segment: Segment, start: Array, end: Array) -> Array:
@@ -30,13 +31,12 @@ def shaken_between(segment: Segment, start: Array, end: Array) -> Array:
         (K, 3) by body axes, (m/s)^2.
     """
     t, sums = segment.once(_shaken)
-    middle, out = (start + end) / 2.0, np.empty((len(start), 3))
-    half = np.maximum(SHAKEN_LASTS_S, end - start) / 2.0
+    middle, lasts = (start + end) / 2.0, end - start
+    half = np.maximum(SHAKEN_LASTS_S, lasts) / 2.0
     low, high = np.maximum(middle - half, t[0]), np.minimum(middle + half, t[-1])
     inside = np.maximum(high - low, np.finfo(float).tiny)
-    for axis in range(3):
-        found = np.interp(high, t, sums[:, axis]) - np.interp(low, t, sums[:, axis])
-        out[:, axis] = np.maximum(found, 0.0) / inside * (end - start)
+    found = straight(t, sums, high) - straight(t, sums, low)
+    out: Array = np.maximum(found, 0.0) * (lasts / inside)[:, None]
     return out
 
 

@@ -17,8 +17,8 @@ from onboard.core.maths.compiler import part
 
 NOTHING, SOMETHING, UNTOLD = 0, 1, 2
 """What is in a tail; of what is untold, a gate may have something to say."""
-BY_COVARIANCE = 0
-"""How well the estimate is known: a matrix is its covariance; else its information."""
+BY_COVARIANCE, BY_INFORMATION = 0, 1
+"""How well the estimate is known: a matrix is its covariance, or its information."""
 _TILT, _HEADING = ANEW["t"], ANEW["y"]
 
 

@@ -124,11 +124,21 @@ def levelled(batches: Sequence[Batch], density: Array, level: Array) -> list[Bat
 
 def periodograms(raw: Array, step: float) -> Iterator[Array]:
     """Two-sided densities (bins, 3), (m/s^2)^2 s, of stretches that overlap by half (Welch)."""
-    n = 2 * round(RESOLVED_S / step / 2.0)
+    n = samples_of_stretch(step)
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
-    for i in range(0, len(raw) - n + 1, max(n // 2, 1)):
+    for i in stretches(len(raw), n):
         piece = raw[i : i + n] - raw[i : i + n].mean(axis=0)
         yield np.abs(np.fft.rfft(piece * window, axis=0)) ** 2 * (step / np.sum(window**2))
+
+
+def samples_of_stretch(step: float) -> int:
+    """How many a stretch of a spectrum has; they are a ``step`` apart, s."""
+    return 2 * round(RESOLVED_S / step / 2.0)
+
+
+def stretches(count: int, n: int) -> range:
+    """Where those of ``n`` samples begin, each half of one after the other, among ``count``."""
+    return range(0, count - n + 1, max(n // 2, 1))
 
 
 def _gain(density: Array, noise: Array) -> Array:

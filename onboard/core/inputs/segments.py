@@ -18,7 +18,7 @@ from onboard.core.maths.frames import (
     rotation_from_vector,
     vector_from_rotation,
 )
-from onboard.core.maths.interpolation import Hermite
+from onboard.core.maths.interpolation import Hermite, straight
 
 PARTS = 6
 """Into which the time from one attitude sample to the next is cut: 0.1 s at the longest, within
@@ -175,17 +175,7 @@ class Segment:
         t, x = self.slow[name]
         if x.ndim == 1:
             return np.interp(at, t, x)
-        if len(t) < 2:
-            return np.broadcast_to(x[0], (*np.shape(at), x.shape[1]))
-        loops = compiled_loops()
-        if loops is not None:
-            found = np.empty((np.size(at), x.shape[1]))
-            loops.straight(plain(t), plain(x), plain(at).ravel(), found)
-            return found.reshape(*np.shape(at), x.shape[1])
-        i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
-        share = np.clip((at - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)[..., None]
-        out: Array = x[i] + share * (x[i + 1] - x[i])
-        return out
+        return straight(t, x, at)
 
     def attitude_at(
         self, at: Array, delay: float = 0.0, curve: Hermite | None = None

@@ -21,10 +21,15 @@ from enum import IntEnum
 
 import numpy as np
 
-from onboard.core.inputs.expected_force import averaged, periodograms, step_of
-from onboard.core.inputs.joined import joined, runs, with_samples, with_signal
+from onboard.core.inputs.expected_force import (
+    averaged,
+    periodograms,
+    samples_of_stretch,
+    step_of,
+    stretches,
+)
+from onboard.core.inputs.joined import joined, runs, times, with_samples, with_signal
 from onboard.core.inputs.limits import (
-    RESOLVED_S,
     SPECTRUM_BINS,
     TONE_BESIDE,
     TONE_BINS,
@@ -139,7 +144,7 @@ def tones(density: Array, wide: int = 1) -> Array:
 
 def without(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
     """The same flight with the expectation of the force where its samples have tones."""
-    half = _samples(step_of(batches)) // 2
+    half = samples_of_stretch(step_of(batches)) // 2
     shares = _shares(tones, half + 1)
     first = 0
 
@@ -160,7 +165,7 @@ def with_parts(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
 
     Its columns are the tones, m/s^2 along the axis of each.
     """
-    half = _samples(step_of(batches)) // 2
+    half = samples_of_stretch(step_of(batches)) // 2
     first = 0
 
     def made_of(raw: Array) -> Array:
@@ -192,18 +197,14 @@ def density_of(tones: Sequence[Tone], density: Array, count: int) -> Array:
 
 def stretches_of(batches: Sequence[Batch]) -> int:
     """How many there are in a flight."""
-    return sum(1 for _ in _stretches(batches, step_of(batches)))
+    n = samples_of_stretch(step_of(batches))
+    return sum(len(stretches(len(times(run)), n)) for run in runs(batches))
 
 
 def _stretches(batches: Sequence[Batch], step: float) -> Iterator[Array]:
     """Densities (bins, 3) of each."""
     for run in runs(batches):
         yield from periodograms(joined(run)[1], step)
-
-
-def _samples(step: float) -> int:
-    """Of a stretch."""
-    return 2 * round(RESOLVED_S / step / 2.0)
 
 
 def _lines(density: Array, wide: int = 1) -> list[tuple[int, Line]]:
@@ -220,7 +221,7 @@ def _lines(density: Array, wide: int = 1) -> list[tuple[int, Line]]:
 
 def _variance(line: Line, step: float) -> float:
     """(m/s)^2, of the velocity that a line would be."""
-    apart = 1.0 / (_samples(step) * step)
+    apart = 1.0 / (samples_of_stretch(step) * step)
     f = apart * (line.first + np.arange(len(line.density)))
     return float(np.sum(2.0 * apart * line.density / (2.0 * np.pi * f) ** 2))
 

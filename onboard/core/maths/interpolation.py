@@ -70,3 +70,24 @@ class Hermite:
             value *= u
         value += zero.take(i, axis=0)
         return value.reshape(*np.shape(at), *self._shape)
+
+
+def straight(t: Array, x: Array, at: Array) -> Array:
+    """(*at.shape, d) by straight lines between samples ``x`` (n, d), the ends held.
+
+    Args:
+        t: (n,) times of the samples, s.
+        x: the samples.
+        at: times of any shape, s.
+    """
+    if len(t) < 2:
+        return np.broadcast_to(x[0], (*np.shape(at), x.shape[1]))
+    loops = compiled_loops()
+    if loops is not None:
+        found = np.empty((np.size(at), x.shape[1]))
+        loops.straight(plain(t), plain(x), plain(at).ravel(), found)
+        return found.reshape(*np.shape(at), x.shape[1])
+    i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    share = np.clip((at - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)[..., None]
+    out: Array = x[i] + share * (x[i + 1] - x[i])
+    return out

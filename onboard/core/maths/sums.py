@@ -184,6 +184,11 @@ class BankSums:
         """(B,)."""
         return self._added()[:, 0, 0]
 
+    def products(self, i: int) -> Array:
+        """(m + 1, m + 1) of one member: of ``y`` (first) and ``h`` with all of these."""
+        out: Array = self._added()[i]
+        return out
+
     def add(self, y: Array, h: Array, log_det: Array) -> None:
         """Add whitened innovations.
 
@@ -256,15 +261,15 @@ class BankSums:
         Returns:
             B numbers, up to a constant that all members share.
         """
-        information = np.diag(1.0 / prior_sigma**2)
-        prior_b = information @ prior
-        constant = float(prior @ prior_b)
-        out = []
-        N, b, s = self.N, self.b, self.s
-        for i in range(len(s)):
-            A = N[i] + information
-            c = b[i] + prior_b
-            theta = np.linalg.solve(A, c)
-            nis = float(s[i] + constant - c @ theta)
-            out.append(-0.5 * (self.log_det[i] + nis + float(np.linalg.slogdet(A)[1])))
+        # Unknowns counted from their means: what is then left of the data is one more row of the
+        # products, and one factor says both that and the information's volume.
+        gram = np.roll(self._added(), -1, axis=(1, 2))
+        i = np.arange(len(prior))
+        gram[:, -1] -= prior @ gram[:, :-1]
+        gram[:, :, -1] -= gram[:, :, :-1] @ prior
+        gram[:, i, i] += 1.0 / prior_sigma**2
+        gram[:, -1, -1] += 1.0  # where there are no data nothing is left
+        diagonal = np.einsum("bii->bi", np.linalg.cholesky(gram))
+        nis, volume = diagonal[:, -1] ** 2 - 1.0, 2.0 * np.log(diagonal[:, :-1]).sum(axis=1)
+        out: list[float] = (-0.5 * (self.log_det + nis + volume)).tolist()
         return out

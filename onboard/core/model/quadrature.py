@@ -60,6 +60,13 @@ class Signals:
         """(3, 3) board orientation."""
         return self.segment.R_bs
 
+    def and_at(self, others: Signals) -> Signals:
+        """These and others of the same segment one after the other, S = (n,)."""
+        both = ((self.w_b, others.w_b), (self.raw_s, others.raw_s), (self.f_b, others.f_b))
+        w_b, raw_s, f_b = (np.concatenate([a.reshape(-1, 3), b.reshape(-1, 3)]) for a, b in both)
+        t = np.concatenate([self.t.ravel(), others.t.ravel()])
+        return Signals(t, w_b, raw_s, f_b, self.segment, None, self.curve)
+
 
 @dataclass(frozen=True, slots=True)
 class Intervals:

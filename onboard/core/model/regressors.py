@@ -301,17 +301,18 @@ class Model:
         gained, body = np.zeros((K, 9, m + 1)), np.zeros((epochs, 9, m + 1))
         ned, along = np.zeros((epochs, 9, m)), np.zeros((epochs, m))
         of = intervals.of_sensors()
-        averaged: list[tuple[slice, Array]] = []
+        accelerations = _Accelerations(intervals, of, around.spread, gained, body)
         for family in self.families:
             if not family.available(around.now):
                 continue
             s = self.slices[family.name]
             columns = slice(s.start + 1, s.stop + 1)
-            _accelerated(family, intervals, of, gained[:, :, columns])
-            if family.is_averaged and around.spread is not None:
-                there = family.acceleration(around.spread.nodes)
-                if there is not None:
-                    averaged.append((columns, there))
+            accelerations.add(family, columns)
+            turn = family.turned(of)
+            if turn is not None:
+                gained[:, 6:9, columns] = turn
+            elif (w := family.rate(intervals.signals)) is not None:
+                gained[:, 6:9, columns] = intervals.integrals(w)[0]
             for first, d in (
                 (0, family.velocity(around)),
                 (3, family.position(around)),
@@ -323,38 +324,71 @@ class Model:
                     ned[:, first : first + 3, s] = d.ned
                 if d.along_velocity is not None:
                     along[:, s] = d.along_velocity
-        if averaged and around.spread is not None:
-            _averaged(averaged, around.spread, body)
+        accelerations.spread_out()
         acting = np.flatnonzero((ned != 0.0).any(axis=(0, 1)))
         return SegmentRegressors(gained, body, ned, along, of, acting)
 
 
-def _averaged(parts: Sequence[tuple[slice, Array]], spread: Spread, body: Array) -> None:
-    """Add what a receiver makes of accelerations, all at once, to a stack (K, 9, m + 1).
+class _Accelerations:
+    """What accelerations of families gain, and what a receiver makes of that, in their columns."""
 
-    Args:
-        parts: columns of each, and (n, 3, k) at the nodes of what is averaged.
-        spread: what the receiver makes of them.
-        body: the stack.
-    """
-    there = np.concatenate([a for _, a in parts], axis=-1)
-    both = np.empty((len(body), 6, there.shape[-1]))
-    spread.of(there, both[:, 0:3], both[:, 3:6])
-    at = 0
-    for columns, a in parts:
-        body[:, 0:6, columns] += both[:, :, at : at + a.shape[-1]]
-        at += a.shape[-1]
+    def __init__(
+        self,
+        intervals: Intervals,
+        of: OfSensors,
+        spread: Spread | None,
+        gained: Array,
+        body: Array,
+    ) -> None:
+        """Take where they are asked for, and what they are written to.
 
+        Args:
+            intervals: K of them.
+            of: integrals over these of what every model asks of the sensors.
+            spread: what a receiver makes of accelerations; None if it averages over nothing.
+            gained: (K, 9, m + 1) stack of what is gained.
+            body: (K + 1, 9, m + 1) stack of what a receiver reports.
+        """
+        self._intervals, self._of, self._spread = intervals, of, spread
+        self._gained, self._body = gained, body
+        self._both: Signals | None = None
+        self._columns: list[int] = []
+        self._seen: list[Array] = []
 
-def _accelerated(family: Family, intervals: Intervals, of: OfSensors, out: Array) -> None:
-    """What acceleration and rate of a family gain, into its columns (K, 9, k) of a stack."""
-    both = family.gained(intervals, of)
-    if both is not None:
-        out[:, 0:3], out[:, 3:6] = both[:, 0], both[:, 1]
-    elif (a := family.acceleration(intervals.signals)) is not None:
-        intervals.integrate(a, out[:, 0:3], out[:, 3:6])
-    turn = family.turned(of)
-    if turn is not None:
-        out[:, 6:9] = turn
-    elif (w := family.rate(intervals.signals)) is not None:
-        out[:, 6:9] = intervals.integrals(w)[0]
+    def add(self, family: Family, columns: slice) -> None:
+        """Integrate the acceleration of a family, and keep what a receiver averages of it."""
+        out, spread = self._gained[:, :, columns], self._spread if family.is_averaged else None
+        known = family.gained(self._intervals, self._of)
+        if known is not None:
+            out[:, 0:3], out[:, 3:6] = known[:, 0], known[:, 1]
+            seen = None if spread is None else family.acceleration(spread.nodes)
+        else:
+            a, seen = self._at_all_nodes(family, spread)
+            if a is not None:
+                self._intervals.integrate(a, out[:, 0:3], out[:, 3:6])
+        if seen is not None:
+            self._columns += range(columns.start, columns.stop)
+            self._seen.append(seen)
+
+    def _at_all_nodes(
+        self, family: Family, spread: Spread | None
+    ) -> tuple[Array | None, Array | None]:
+        """Acceleration at the nodes of the intervals, and at those of what is averaged.
+
+        Asked for at once: there are so few that some of them take as long as all.
+        """
+        own = self._intervals.signals
+        if spread is None:
+            return family.acceleration(own), None
+        if self._both is None:
+            self._both = own.and_at(spread.nodes)
+        a = family.acceleration(self._both)
+        if a is None:
+            return None, None
+        return a[: own.t.size].reshape(*own.t.shape, 3, -1), a[own.t.size :]
+
+    def spread_out(self) -> None:
+        """Add what a receiver makes of all of them, at once."""
+        if self._seen and self._spread is not None:
+            there = np.concatenate(self._seen, axis=-1)
+            self._spread.add(there, np.array(self._columns), self._body)

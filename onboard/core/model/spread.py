@@ -48,28 +48,30 @@ class Spread:
     velocity: Array
     place: Array
 
-    def of(self, acceleration: Array, velocity: Array, place: Array) -> None:
-        """What is reported beside velocity and place, body axes of the epochs.
+    def add(self, acceleration: Array, columns: NDArray[np.intp], stack: Array) -> None:
+        """Add what is reported beside velocity and place to columns of a stack.
 
         Args:
             acceleration: (n, 3, m) at the nodes, body axes, m/s^2 per unit.
-            velocity: (K, 3, m) written to.
-            place: (K, 3, m) written to.
+            columns: (m,) of the stack.
+            stack: (K, 9, ..) three vectors, body axes of the epochs, of which the first is of
+                velocity and the second of place.
         """
         loops = compiled_loops()
         n, _, m = acceleration.shape
         K = len(self.at)
         if loops is not None:
             turns, first = (self.R, plain(self.R_epoch)), self.at[:, 0].copy()
-            of = self.velocity, self.place, plain(acceleration)
-            loops.spread(*turns, first, *of, velocity, place)
+            loops.spread(
+                *turns, first, self.velocity, self.place, plain(acceleration), columns, stack
+            )
             return
         there = np.clip(self.at, 0, n - 1)
         weights = np.where(there == self.at, np.stack((self.velocity, self.place)), 0.0)
         turned = (self.R @ acceleration).reshape(n, 3 * m)
         both = weights.swapaxes(0, 1) @ turned[there]
         back = np.swapaxes(self.R_epoch, -1, -2)[:, None] @ both.reshape(K, 2, 3, m)
-        velocity[:], place[:] = back[:, 0], back[:, 1]
+        stack[:, 0:6, columns] += back.reshape(K, 6, m)
 
 
 def reaches(window: float, apart: float, h: Array) -> tuple[float, float]:

@@ -147,7 +147,7 @@ def test_what_is_in_a_tail_is_so_either_way(engine, monkeypatch, held, members):
     first = Pass(engine.model, engine.point, (USUAL,))
     for batch in engine.batches:
         through(first, batch, 10.0)
-    known = first.theta, np.linalg.inv(first.uncertainty.matrix)
+    known = first.theta, np.linalg.inv(first.estimate.uncertainty.matrix)
     widened, seen = WhiteningFilter._widened, []
 
     def noted(self, made, z, kinds, white, wider):

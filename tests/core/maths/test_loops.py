@@ -114,15 +114,18 @@ def test_what_a_receiver_makes_of_accelerations_is_the_same(seed, window, lag):
     epoch = np.sort(rng.uniform(flown.t[0] + 0.7, flown.t[-1] - 0.7, 8))
     maker = NodeMaker(flown, np.zeros(3), np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
     made = around(maker, epoch, window, None, np.array([0.1, 0.2, 0.0, lag])).spread
-    x = rng.normal(size=(len(made.R), 3, 5))
+    x, before = rng.normal(size=(len(made.R), 3, 5)), rng.normal(size=(8, 9, 7))
 
-    def of():
-        out = np.empty((8, 6, 5))
-        made.of(x, out[:, 0:3], out[:, 3:6])
-        return [out]
+    def added():
+        stack = before.copy()
+        made.add(x, np.array([1, 2, 4, 5, 6]), stack)
+        return stack
 
-    for one, other in zip(*both_ways(of), strict=True):
-        np.testing.assert_allclose(other, one, atol=1e-12 * (1.0 + np.abs(one).max()))
+    one, other = both_ways(added)
+    np.testing.assert_allclose(other, one, atol=1e-12 * (1.0 + np.abs(one).max()))
+    for stack in (one, other):  # what is no place, and columns that were not named, stay
+        np.testing.assert_array_equal(stack[:, 6:], before[:, 6:])
+        np.testing.assert_array_equal(stack[..., [0, 3]], before[..., [0, 3]])
 
 
 @given(SEEDS, st.integers(1, 300))

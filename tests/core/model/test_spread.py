@@ -87,8 +87,9 @@ def test_a_column_is_what_the_response_to_the_force_changes_by(h):
 
     six, moved = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.02, -0.01, 0.03, 0, 0, 0.2])
     here = at(six)
-    velocity, place = np.empty((2, 20, 3, 6))
-    here.spread.of(columns(here.spread.nodes), velocity, place)
+    stack = np.zeros((20, 9, 6))
+    here.spread.add(columns(here.spread.nodes), np.arange(6), stack)
+    velocity, place = stack[:, 0:3], stack[:, 3:6]
     there = at(six + moved)
     size = np.abs(there.averaged - here.averaged).max()
     np.testing.assert_allclose(

@@ -171,8 +171,8 @@ def own(
 
 
 @compiled(
-    "void(f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,:], "
-    "f8[:,:,:])"
+    "void(f8[:,:,::1], f8[:,:,::1], i8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], i8[::1], "
+    "f8[:,:,::1])"
 )
 def spread(
     R: Array,
@@ -181,10 +181,10 @@ def spread(
     velocity: Array,
     place: Array,
     x: Array,
-    one: Array,
-    two: Array,
+    columns: NDArray[np.int64],
+    stack: Array,
 ) -> None:
-    """``R_epoch^T sum velocity R x`` and ``R_epoch^T sum place R x``, into (K, 3, m).
+    """Add ``R_epoch^T sum velocity R x`` and ``R_epoch^T sum place R x``, (K, 3, m) each.
 
     Args:
         R: (n, 3, 3) body axes of the nodes to those that do not turn.
@@ -193,8 +193,8 @@ def spread(
         velocity: (K, b) weights of that and the next.
         place: (K, b).
         x: (n, 3, m).
-        one: written to.
-        two: written to.
+        columns: (m,) of the stack that these are added to.
+        stack: (K, 9, ..) rows 0 to 2 for the first, 3 to 5 for the second.
     """
     n, _, m = x.shape
     K, b = velocity.shape
@@ -216,9 +216,10 @@ def spread(
                 of_p[c] += places * y[c]
         for r in range(3):
             d, e, f = R_epoch[k, 0, r], R_epoch[k, 1, r], R_epoch[k, 2, r]
+            seen, there = stack[k, r], stack[k, 3 + r]
             for c in range(m):
-                one[k, r, c] = d * of_v[c] + e * of_v[m + c] + f * of_v[2 * m + c]
-                two[k, r, c] = d * of_p[c] + e * of_p[m + c] + f * of_p[2 * m + c]
+                seen[columns[c]] += d * of_v[c] + e * of_v[m + c] + f * of_v[2 * m + c]
+                there[columns[c]] += d * of_p[c] + e * of_p[m + c] + f * of_p[2 * m + c]
 
 
 @part
