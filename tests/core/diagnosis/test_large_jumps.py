@@ -18,8 +18,9 @@ from tests.core.diagnosis.flights import batches, flown
 
 AT = 90.23
 SIGMAS = 4.0
-SIZES = {15: {"x": -3.7}, 20: {"x": -3.3, "y": 0.2}}
-"""m/s^2, by seed; of planes: a copter's EKF of the simulator gives GPS up for good."""
+SIZES = {32: {"z": 3.4}}
+"""m/s^2, by seed; of a plane, along z: after such a jump the simulator's EKF mostly gives GPS up, for
+half a minute or for good, and what was flown without any fix does not tell it."""
 FIRST_S = 1.0
 """First sample, s on the boot clock, which the simulator's times are of."""
 
@@ -56,17 +57,10 @@ def time_of(seed):
 @pytest.mark.slow
 def test_it_is_placed_as_well_as_its_size_allows():
     """A jump of 4 m/s^2 that is 0.05 s off is a velocity of 0.2 m/s, which no receiver misses."""
-    told = time_of(15)
+    told = time_of(32)
     # The simulator's low-pass and telemetry at 50 Hz are a few hundredths of a second.
     assert told.value == pytest.approx(AT - FIRST_S, abs=0.06)
     assert told.sigma < 0.1
-
-
-@pytest.mark.slow
-def test_where_no_fix_is_it_is_placed_no_better_than_that():
-    """The autopilot gives its receiver up with the jump, for half a minute."""
-    told = time_of(20)
-    assert abs(told.value + FIRST_S - AT) < 3.0 * told.sigma
 
 
 def test_what_is_taken_off_the_samples_is_not_told_twice():
