@@ -19,8 +19,8 @@ from tests.core.diagnosis.flights import batches, flown
 AT = 90.23
 SIGMAS = 4.0
 SIZES = {32: {"z": 3.4}}
-"""m/s^2, by seed; of a plane, along z: after such a jump the simulator's EKF mostly gives GPS up, for
-half a minute or for good, and what was flown without any fix does not tell it."""
+"""m/s^2, by seed; of a plane, along z: after such a jump the simulator's EKF mostly gives GPS up,
+for half a minute or for good, and what was flown without any fix does not tell it."""
 FIRST_S = 1.0
 """First sample, s on the boot clock, which the simulator's times are of."""
 
