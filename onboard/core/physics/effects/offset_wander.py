@@ -21,11 +21,11 @@ PLAUSIBLE = 0.3
 """m/s^2; a sensor that wanders by more is broken [data sheet: the offset of an MPU-6000 changes by
 0.34 along x and y from 0 to 70 degC]."""
 TINY = 1e-12
-"""m/s^2; a wander of nothing has no direction."""
+"""m/s^2; a wander of nothing has no direction [bound]."""
 
 
 class OffsetWander(Effect):
-    """Offset that walks at random; without its flight (:meth:`along`) it is no candidate yet.
+    """Offset that is never quite the same; without its flight (:meth:`along`) it is no candidate yet.
 
     It is the bias instability of data sheets: flicker noise, about its mean, which is the offset.
     """
