@@ -25,7 +25,7 @@ TINY = 1e-12
 
 
 class OffsetWander(Effect):
-    """Offset that is never quite the same; without its flight (:meth:`along`) it is no candidate yet.
+    """Offset that is not quite the same; without its flight (:meth:`along`) it is no candidate yet.
 
     It is the bias instability of data sheets: flicker noise, about its mean, which is the offset.
     """
