@@ -14,8 +14,9 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.false_samples import spikes_effect
 from onboard.core.diagnosis.felt import Asked, felt, mean_walk_s
 from onboard.core.diagnosis.limits import CLEARLY
-from onboard.core.diagnosis.records import NotTestable
-from onboard.core.diagnosis.screening import false_fixes, misled, unbelieved, unclipped
+from onboard.core.diagnosis.records import NotTestable, Unused
+from onboard.core.diagnosis.refusals import Refused, contradicted, repeated, unused_flight
+from onboard.core.diagnosis.screening import false_fixes, heard, misled, unbelieved, unclipped
 from onboard.core.diagnosis.testability import testable_of
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
@@ -35,7 +36,9 @@ class Cleared:
     """A flight without what must not be fitted, with every effect that it can be asked for.
 
     ``clipped`` if the accelerometer clipped nearly all the time, and nothing was left out;
-    ``sampled`` is the flight before anything was expected of its samples.
+    ``sampled`` is the flight before anything was expected of its samples.  ``heard`` is what is
+    believed of it although the autopilot's filter gave its receiver up, ``at_odds`` where that is
+    far from the accelerometer in any model.
     """
 
     full: Examination
@@ -47,6 +50,8 @@ class Cleared:
     coarse: Finding | None
     clipped: bool
     sampled: Sequence[Batch]
+    heard: tuple[Refused, ...] = ()
+    at_odds: tuple[Unused, ...] = ()
 
     @property
     def as_sampled(self) -> tuple[Batch, ...]:
@@ -159,6 +164,33 @@ def _matter(spikes: Spikes, as_read: Sequence[Batch], full: Examination, engine:
         made.once()
         told.append(made.log_likelihood)
     return 2.0 * (told[0] - told[1]) > CLEARLY
+
+
+def unused_of(
+    clear: Cleared,
+    flight: Sequence[Batch],
+    calibrator: Calibrator,
+    origin: Origin,
+    final: Examination,
+) -> tuple[Unused, ...]:
+    """Flight whose fixes, or whose readings of an accelerometer, were not used.
+
+    Args:
+        clear: the flight without what must not be fitted.
+        flight: all of it.
+        calibrator: has seen it.
+        origin: what effects count from.
+        final: the model that stands.
+    """
+    t0, imu = origin.t0, origin.imu
+    refusals, asked = calibrator.trust.refusals, not clear.clipped
+    far = [(u.start_s, u.end_s) for u in clear.at_odds]
+    far += clear.fault.intervals if clear.fault is not None else ()
+    return (
+        *unused_flight(heard(flight, clear.heard), refusals, far, t0, asked=asked),
+        *contradicted(final.batches, final.refused_velocities(), clear.fault, t0),
+        *repeated([s for s in calibrator.stuck(imu) if s[1] >= t0], t0),
+    )
 
 
 def since_reboot(batches: Sequence[Batch], since: float = -np.inf) -> list[Batch]:

@@ -34,9 +34,8 @@ from onboard.core.diagnosis.records import (
     Unused,
     Verdict,
 )
-from onboard.core.diagnosis.regimes import (
-    regime_residuals,
-)
+from onboard.core.diagnosis.refusals import LONG_S, Refused
+from onboard.core.diagnosis.regimes import regime_residuals
 from onboard.core.diagnosis.score import surprise
 from onboard.core.diagnosis.selection import Fit
 from onboard.core.diagnosis.undecided import in_words, left_open, undecided
@@ -63,7 +62,8 @@ class Evidence:
     ``companions`` are all accelerometers of the vehicle; ``believed`` is the number of fixes of the
     flight that were to be used, ``unused`` flight without any; ``sampled`` is the flight as it was
     sampled, but for what is false; ``clipped`` if the accelerometer was at its rail so much of it
-    that nothing was left out.
+    that nothing was left out; ``heard`` is what is believed of it although the autopilot's filter
+    gave the receiver up, ``at_odds`` where that fits no model.
     """
 
     full: Examination
@@ -76,6 +76,8 @@ class Evidence:
     unused: tuple[Unused, ...] = ()
     sampled: tuple[Batch, ...] = ()
     clipped: bool = False
+    heard: tuple[Refused, ...] = ()
+    at_odds: tuple[Unused, ...] = ()
 
 
 class Judge:
@@ -108,7 +110,7 @@ class Judge:
         ladder, fits = self.final.ladder()
         before, after = fits[0], fits[-1]
         effects = self.findings.made(self.imu, self.evidence.doubts) + self.excluded
-        every = inconstant(self.final)
+        every = (*self._at_odds(), *inconstant(self.final))
         # What contradicts the model bends what else there is to doubt.
         changing = tuple(c for c in every if c.contradicts) or every
         # What was clipped is left out of the fit, and was flown all the same.
@@ -120,7 +122,8 @@ class Judge:
         claimed = np.array(c.covariance).diagonal()
         others = of_others(self.choice, self.final.origin.t0, claimed)
         open_ = in_words(self.undecided, SixParameters(c.scale, c.offset), claimed)
-        note = " ".join(x for x in (note, open_, others, trim) if x)
+        right = _right_all_the_same(self.evidence.heard, self.final.origin.t0)
+        note = " ".join(x for x in (note, right, open_, others, trim) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)
@@ -236,6 +239,21 @@ class Judge:
             )
         return Verdict.CLEAN, note
 
+    def _at_odds(self) -> tuple[Inconstant, ...]:
+        """An accelerometer and a receiver that contradict each other until the flight ends.
+
+        Where both agree again, what the accelerometer is was the same before and after.
+        """
+        far = self.evidence.at_odds
+        if not far:
+            return ()
+        end, t0 = far[-1].end_s, self.final.origin.t0
+        used = [float(b.fixes.t[b.trusted][-1]) for b in self.engine.batches if b.trusted.any()]
+        if max(used, default=t0) - t0 > end + LONG_S:
+            return ()
+        since = f"from {far[0].start_s:.0f} s on this accelerometer and GPS contradict each other"
+        return (Inconstant(BiasStep.effect, f"{since}, and nothing tells which of them is false"),)
+
     def _ambiguous(self, effects: list[Finding]) -> tuple[Ambiguity, ...]:
         by_name = {f.effect: f for f in self.final.families}
         out = []
@@ -299,6 +317,14 @@ def _unsteady(evidence: Evidence) -> Array:
     out = np.zeros((6, 6))
     out[3:, 3:] = np.diag(R_bs.T**2 @ by_axis)
     return out
+
+
+def _right_all_the_same(heard: Sequence[Refused], t0: float) -> str:
+    """That a receiver is believed although the autopilot's filter complained of it."""
+    if not heard:
+        return ""
+    when = ", ".join(f"{r.start - t0:.0f} to {r.end - t0:.0f} s" for r in heard)
+    return f"fixes that the autopilot's filter complained of ({when}) fit, and are used."
 
 
 def _not_compared(unused: Sequence[Unused]) -> tuple[Unused, ...]:

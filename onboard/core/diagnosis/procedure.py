@@ -12,12 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log
 
-from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot
+from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot, unused_of
 from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.effort import FURTHEST, SEARCHED
 from onboard.core.diagnosis.evidence import Evidence, Judge
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.final_model import FinalModel
+from onboard.core.diagnosis.given_up import GivenUp
 from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
     alike,
@@ -34,8 +35,8 @@ from onboard.core.diagnosis.jumps import (
 )
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.nuisance_rivals import compared
-from onboard.core.diagnosis.records import Diagnosis, Unused
-from onboard.core.diagnosis.refusals import believed, contradicted, repeated, unused_flight
+from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.diagnosis.refusals import believed
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, only, opened, settled
@@ -87,6 +88,8 @@ def examine(
     companions = _companions(calibrator, imu, clear, latest=latest, since=since)
     asked = _Asked(clear.testable, companions, imu)
     stands = _modelled(clear.full, asked, origin, calibrator, named_only=clear.clipped)
+    if clear.fault is None and not clear.clipped:
+        clear, stands = _with_given_up(clear, stands, asked, origin, calibrator)
     # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
     wander = None
     if clear.fault is None:
@@ -106,9 +109,11 @@ def examine(
             stands.rivals,
             companions,
             believed(clear.sampled, calibrator.trust.refusals),
-            _unused(calibrator, imu, (clear, flight), stands.final, origin.t0),
+            unused_of(clear, flight, calibrator, origin, stands.final),
             clear.as_sampled,
             clear.clipped,
+            clear.heard,
+            clear.at_odds,
         ),
         origin,
         clear.absent,
@@ -148,6 +153,29 @@ def _modelled(
     return _Stands(full, choice, rivals, final, families)
 
 
+def _with_given_up(
+    clear: Cleared, stands: _Stands, asked: _Asked, origin: Origin, calibrator: Calibrator
+) -> tuple[Cleared, _Stands]:
+    """The flight and its model, with what the autopilot's filter gave up if it was wrong there.
+
+    That is asked where velocities are far from the model, or an accelerometer is known to have
+    jumped, which is what a filter complains of.
+    """
+    given_up = GivenUp(calibrator, clear.sampled, origin.t0)
+    if not given_up:
+        return clear, stands
+    contradicted = given_up.contradicted(given_up.gone_through(stands.final))
+    if not contradicted and all(f.onset is None for f in stands.families):
+        return clear, stands
+    full = given_up.believed(clear.full)
+    other = _modelled(full, asked, origin, calibrator, named_only=clear.clipped)
+    contradicts = other.final.found().contradicts or any(not f.named for f in other.families)
+    if contradicts or given_up.contradicted(other.final):
+        return replace(clear, at_odds=contradicted), stands
+    sampled = given_up.heard(clear.sampled)
+    return replace(clear, full=other.full, sampled=sampled, heard=given_up.stretches), other
+
+
 def _beside_wander(
     stands: _Stands,
     found: Wandering,
@@ -168,31 +196,6 @@ def _beside_wander(
     if not still_wanders(other.final, found.wander):
         return stands
     return replace(other, families=[*other.families, found.wander])
-
-
-def _unused(
-    calibrator: Calibrator,
-    imu: int,
-    flown: tuple[Cleared, Sequence[Batch]],
-    final: Examination,
-    t0: float,
-) -> tuple[Unused, ...]:
-    """Flight whose fixes, or whose readings of an accelerometer, were not used.
-
-    Args:
-        calibrator: has seen the flight.
-        imu: which accelerometer.
-        flown: the flight without what must not be fitted, and all of it.
-        final: the model that stands.
-        t0: what effects count from, s.
-    """
-    clear, flight = flown
-    refusals, asked = calibrator.trust.refusals, not clear.clipped
-    return (
-        *unused_flight(flight, refusals, clear.fault, t0, asked=asked),
-        *contradicted(final.batches, final.refused_velocities(), clear.fault, t0),
-        *repeated([s for s in calibrator.stuck(imu) if s[1] >= t0], t0),
-    )
 
 
 def _origin(calibrator: Calibrator, imu: int, flight: Sequence[Batch], *, latest: bool) -> Origin:

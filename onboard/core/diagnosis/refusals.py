@@ -108,17 +108,24 @@ def believed(batches: Sequence[Batch], refusals: Sequence[RefusedFixes]) -> int:
 def unused_flight(
     batches: Sequence[Batch],
     refusals: Sequence[RefusedFixes],
-    fault: Finding | None,
+    far: Sequence[tuple[float, float]],
     t0: float,
     *,
     asked: bool,
 ) -> tuple[Unused, ...]:
-    """What was not used, s since ``t0``, and what the inertia says of it, if it was ``asked``."""
+    """What was not used, s since ``t0``, and what the inertia says of it, if it was ``asked``.
+
+    Args:
+        batches: the flight.
+        refusals: of the trust window.
+        far: where velocities are far from what the inertia says, s since ``t0``.
+        t0: s on the boot clock.
+        asked: whether it was.
+    """
     out = []
     for r in refused(batches, refusals):
         start, end = r.start - t0, r.end - t0
-        intervals = fault.intervals if fault is not None else ()
-        said = any(a < end and b > start for a, b in intervals)
+        said = any(a < end and b > start for a, b in far)
         contradicted = said if asked and r.reason in OPINIONS else None
         out.append(Unused(start, end, r.reason.value, contradicted))
     return tuple(out)

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.explaining import heard
 from onboard.core.diagnosis.procedure import diagnose
+from onboard.core.diagnosis.records import Verdict
 from onboard.core.model.quadrature import Signals
 from onboard.core.model.regressors import Model
 from onboard.core.physics.effect import Origin
@@ -18,9 +19,8 @@ from tests.core.diagnosis.flights import batches, flown
 
 AT = 90.23
 SIGMAS = 4.0
-SIZES = {32: {"z": 3.4}}
-"""m/s^2, by seed; of a plane, along z: after such a jump the simulator's EKF mostly gives GPS up,
-for half a minute or for good, and what was flown without any fix does not tell it."""
+SIZES = {20: {"x": -3.3, "y": 0.2}, 33: {"z": 4.0}}
+"""m/s^2, by seed; of planes whose EKF gives GPS up for it: half a minute, and until they land."""
 FIRST_S = 1.0
 """First sample, s on the boot clock, which the simulator's times are of."""
 
@@ -57,10 +57,20 @@ def time_of(seed):
 @pytest.mark.slow
 def test_it_is_placed_as_well_as_its_size_allows():
     """A jump of 4 m/s^2 that is 0.05 s off is a velocity of 0.2 m/s, which no receiver misses."""
-    told = time_of(32)
+    told = time_of(33)
     # The simulator's low-pass and telemetry at 50 Hz are a few hundredths of a second.
     assert told.value == pytest.approx(AT - FIRST_S, abs=0.06)
     assert told.sigma < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SIZES)
+def test_what_the_autopilots_filter_gave_up_for_it_is_used(seed):
+    d, _ = diagnosed(seed)
+    assert d.verdict is Verdict.EXPLAINED
+    assert "complained of" in d.note
+    assert d.calibration.rejected["ekf_gps_glitch"] > 200
+    assert d.unused == ()
 
 
 def test_what_is_taken_off_the_samples_is_not_told_twice():
