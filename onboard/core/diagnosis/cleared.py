@@ -106,7 +106,7 @@ def cleared(
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
         fault = false_fixes(calibrator, engine, full, origin.t0)
     if fault is not None:
-        believed, false = misled(unbelieved(full, fault, origin.t0), fault, origin.t0)
+        believed, false = misled(unbelieved(full, full.batches, fault, origin.t0), fault, origin.t0)
         full = Examination(
             engine,
             testable,

@@ -88,7 +88,7 @@ def examine(
     companions = _companions(calibrator, imu, clear, latest=latest, since=since)
     asked = _Asked(clear.testable, companions, imu)
     stands = _modelled(clear.full, asked, origin, calibrator, named_only=clear.clipped)
-    if clear.fault is None and not clear.clipped:
+    if not clear.clipped:
         clear, stands = _with_given_up(clear, stands, asked, origin, calibrator)
     # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
     wander = None
@@ -161,19 +161,18 @@ def _with_given_up(
     That is asked where velocities are far from the model, or an accelerometer is known to have
     jumped, which is what a filter complains of.
     """
-    given_up = GivenUp(calibrator, clear.sampled, origin.t0)
+    given_up = GivenUp(calibrator, clear, origin.t0)
     if not given_up:
         return clear, stands
     contradicted = given_up.contradicted(given_up.gone_through(stands.final))
     if not contradicted and all(f.onset is None for f in stands.families):
         return clear, stands
-    full = given_up.believed(clear.full)
-    other = _modelled(full, asked, origin, calibrator, named_only=clear.clipped)
+    with_all = given_up.believed(calibrator.engine(asked.imu))
+    other = _modelled(with_all.full, asked, origin, calibrator, named_only=clear.clipped)
     contradicts = other.final.found().contradicts or any(not f.named for f in other.families)
     if contradicts or given_up.contradicted(other.final):
         return replace(clear, at_odds=contradicted), stands
-    sampled = given_up.heard(clear.sampled)
-    return replace(clear, full=other.full, sampled=sampled, heard=given_up.stretches), other
+    return replace(with_all, full=other.full), other
 
 
 def _beside_wander(

@@ -107,11 +107,13 @@ def heard(batches: Sequence[Batch], doubted: Sequence[Refused]) -> list[Batch]:
     return out
 
 
-def unbelieved(full: Examination, fault: Finding, t0: float) -> list[Batch]:
-    """The flight with the fixes of a fault not to be believed."""
+def unbelieved(
+    made: Examination, batches: Sequence[Batch], fault: Finding, t0: float
+) -> list[Batch]:
+    """Flight with the fixes of a fault not to be believed, by the timing of an examination."""
     out = []
-    for batch in full.batches:
-        bad = within(full.point.true_time(batch.fixes.t) - t0, fault.intervals)
+    for batch in batches:
+        bad = within(made.point.true_time(batch.fixes.t) - t0, fault.intervals)
         out.append(replace(batch, trusted=batch.trusted & ~bad))
     return out
 

@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.explaining import heard
+from benchmarks import explaining
 from onboard.answers.answer import answer
 from onboard.core.diagnosis.given_up import GivenUp
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.diagnosis.refusals import OPINIONS
+from onboard.core.diagnosis.screening import heard
 from onboard.core.estimate.result import Status
 from onboard.core.gps.distrust import Distrust, RefusedFixes
 from sitl.builtin.effects.accelerometer import ByAxis
@@ -37,7 +38,7 @@ class Loose(ByAxis):
 def flown(seed, loose):
     imus = random_imus(seed)
     spec = FlightSpec(vehicle="plane", seed=seed, duration=180.0, imus=imus, effects=(loose,))
-    given = answer(heard(spec), 1)
+    given = answer(explaining.heard(spec), 1)
     c, truth = given.diagnosis.calibration, imus[0]
     off = np.subtract(c.scale + c.offset, truth.scale + truth.offset)
     assert np.all(np.abs(off) < 4.0 * np.array(c.scale_sigma + c.offset_sigma))
@@ -70,8 +71,9 @@ def test_only_a_filter_that_leans_on_the_accelerometers_is_no_witness_against_th
     for b in flight:
         b.trusted[(b.fixes.t >= 120.0) & (b.fixes.t <= 150.0)] = False
     refusals = (RefusedFixes(120.0, 150.0, reason),)
-    given_up = GivenUp(SimpleNamespace(trust=SimpleNamespace(refusals=refusals)), flight, 100.0)
+    listened = SimpleNamespace(trust=SimpleNamespace(refusals=refusals))
+    given_up = GivenUp(listened, SimpleNamespace(sampled=flight), 100.0)
     by_the_filter = reason in {Distrust.EKF_GPS_GLITCH, Distrust.EKF_UNHEALTHY}
     assert bool(given_up) == by_the_filter
-    believed = np.concatenate([b.trusted for b in given_up.heard(flight)])
+    believed = np.concatenate([b.trusted for b in heard(flight, given_up.stretches)])
     assert believed.all() == by_the_filter
