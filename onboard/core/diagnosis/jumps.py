@@ -234,12 +234,21 @@ def explains(full: Examination, chosen: Sequence[Effect], shock: Shock) -> bool:
 
 
 def _scaled(full: Examination, chosen: Sequence[Effect], jumps: Sequence[BiasStep]) -> Array:
-    """Gain of each jump alone, by the variance of gains over what the sums say."""
+    """Gain of each jump alone, by the variance of gains over what the sums say.
+
+    What a pass takes for known with its jumps decides what it refuses, so that only gains of one
+    pass compare.  Where it takes several, each has the best of those before it among its own, and
+    the others are counted from that one.
+    """
     out: list[float] = []
-    for some in (jumps[i : i + MOST_AT_ONCE] for i in range(0, len(jumps), MOST_AT_ONCE)):
-        fitter, before, fits = fitted(full, chosen, some)
+    while len(out) < len(jumps):
+        best = [int(np.argmax(out))] if out else []
+        some = jumps[len(out) : len(out) + MOST_AT_ONCE - len(best)]
+        fitter, before, fits = fitted(full, chosen, [*some, *(jumps[k] for k in best)])
         variance = max(fitter.pool.variance, 1.0)
-        out += [fitter.gain(before, after) / variance for _, after in fits]
+        gained = [fitter.gain(before, after) / variance for _, after in fits]
+        more = sum(out[k] for k in best) - sum(gained[len(some) :])
+        out += [gain + more for gain in gained[: len(some)]]
     return np.array(out)
 
 
