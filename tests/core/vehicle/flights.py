@@ -58,7 +58,7 @@ def flight_with(t, R, v_n, height, f_b, *, commands=None, volts=None, airspeed=N
 def copter_flight(
     *,
     seed=1,
-    seconds=240.0,
+    seconds=180.0,
     wind=(0.0, 0.0),
     exponent=0.0,
     c_m=0.24833,
@@ -150,7 +150,7 @@ def followed(commands, lag):
 def plane_flight(
     *,
     seed=1,
-    seconds=240.0,
+    seconds=180.0,
     wind=(0.0, 0.0),
     c_lift_0=0.56,
     c_lift_a=6.9,

@@ -102,7 +102,7 @@ def test_thrust_is_found_in_gusts():
 
 @pytest.mark.slow
 def test_lift_is_found_in_gusts_by_its_mean():
-    match = matched(seed=46, gusts=0.5, c_lift_0=0.36)
+    match = matched(seed=46, seconds=240.0, gusts=0.5, c_lift_0=0.36)
     assert told(match) == {"lift"}
     constant, slope = (match.numbers[f"lift.{key}"] for key in ("c_lift_0", "c_lift_a"))
     assert abs(constant.real - 0.36) < 3.0 * constant.sigma
