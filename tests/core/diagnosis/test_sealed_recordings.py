@@ -100,7 +100,7 @@ def test_a_jump_is_placed_beside_what_does_not_change_in_flight():
     """Axes that are far from square moved it by 13 s, and an offset that grows was likelier."""
     square = concealed.CrossAxis(xy=0.022, xz=-0.034, yx=0.036, yz=-0.029, zx=-0.023, zy=-0.027)
     effects = (square, concealed.ImuDelay(delay=0.085), concealed.BiasStep(y=-0.195, time=115.0))
-    said, first = diagnosed("copter", 10, *effects, duration=281.0)
+    said, first = diagnosed("copter", 10, *effects, duration=215.0)
     assert {e.name for e in said.effects} == {"cross_axis", "imu_delay", "bias_step"}
     jump = next(e for e in said.effects if e.name == "bias_step")
     assert jump.unknowns["time"].value + first == pytest.approx(115.0, abs=1.0)
