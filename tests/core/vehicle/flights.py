@@ -58,7 +58,7 @@ def flight_with(t, R, v_n, height, f_b, *, commands=None, volts=None, airspeed=N
 def copter_flight(
     *,
     seed=1,
-    seconds=180.0,
+    seconds=240.0,
     wind=(0.0, 0.0),
     exponent=0.0,
     c_m=0.24833,

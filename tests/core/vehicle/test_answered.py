@@ -31,7 +31,7 @@ def undone(flight, gone):
 
 
 def disturbed(seed, share=0.06, ratio=1.0):
-    flight = copter_flight(seed=seed, seconds=240.0, wind=(3.0, 1.0), ratio=ratio)
+    flight = copter_flight(seed=seed, wind=(3.0, 1.0), ratio=ratio)
     gone = smooth(np.random.default_rng(seed), len(flight), share, 2.0)
     return undone(flight, gone)
 
@@ -50,7 +50,7 @@ def test_commands_that_undo_a_disturbance_are_no_weaker_rotors(seed, ratio):
 
 @pytest.mark.parametrize("seed", [3, 4, 6])
 def test_the_truth_is_between_force_over_command_and_command_over_force(seed):
-    flight = copter_flight(seed=seed, seconds=240.0, wind=(3.0, 1.0))
+    flight = copter_flight(seed=seed, wind=(3.0, 1.0))
     rng = np.random.default_rng(seed)
     gone = np.repeat(rng.normal(0.0, 0.02, len(flight) // WINDOW_STEPS), WINDOW_STEPS)
     fit = fitted(copter_model(undone(flight, gone), CopterAirframe(), SIGMA))
