@@ -83,11 +83,11 @@ CUT = {
 }
 
 
-@pytest.fixture(params=CUT)
-def cut(request, flight, tmp_path) -> tuple[Path, str, str]:
+@pytest.fixture(params=CUT, scope="module")
+def cut(request, flight, tmp_path_factory) -> tuple[Path, str, str]:
     """A recording, what it lacks, and what to do."""
     spoil, lacks, to_do = CUT[request.param]
-    path = tmp_path / "flight.tlog"
+    path = tmp_path_factory.mktemp("cut") / "flight.tlog"
     write(path, spoil(flight))
     return path, lacks, to_do
 

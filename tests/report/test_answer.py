@@ -46,7 +46,7 @@ def test_an_untold_antenna_spoils_nothing(tmp_path):
 @pytest.mark.slow
 def test_axes_that_are_not_square_are_taken_into_account(tmp_path):
     given, _ = replayed(
-        tmp_path, effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05), duration=200.0
+        tmp_path, effects.CrossAxis(xy=0.05, yx=-0.05, zx=0.05, zy=0.05), duration=150.0
     )
     assert given.calibration.status is Status.CALIBRATED
     assert off(given.calibration).max() < min(4.0, plain_off(given).max())

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
 
 import numpy as np
 
 from onboard.core.maths.arrays import Array
+from onboard.core.maths.frames import cross
 from onboard.core.vehicle.flight import Flight
 from onboard.core.vehicle.gusts import signed_square
 
 AHEAD, SIDE, UP = 0, 1, 2
 """Axes of the body: x, y, z."""
+
+
+def speed_of(u_b: Array) -> Array:
+    """(n,) length of each of these (n, 2 or 3)."""
+    # Sums along an axis of three are several times as slow, and the same to the last bit.
+    square = u_b[:, 0] * u_b[:, 0]
+    for k in range(1, u_b.shape[1]):
+        square = square + u_b[:, k] * u_b[:, k]
+    out: Array = np.sqrt(square)
+    return out
 
 
 class Air:
@@ -69,6 +81,7 @@ class Air:
         self.slope = 0.0
         self._u_b: Array | None = None
         self._square_b: Array | None = None
+        self._by_flow: dict[Callable[[Array], Array], Array] = {}
 
     def copied(self) -> Air:
         """The same, to go on from in another way."""
@@ -89,8 +102,17 @@ class Air:
             self._u_b = self.flight.v_b - moved
             if self.turned_n is not None:
                 about = np.einsum("nij,nj->ni", self.flight.R_bn, self.turned_n)
-                self._u_b = self._u_b + np.cross(about, self._u_b)
+                self._u_b = self._u_b + cross(about, self._u_b)
+            # Copies from here on have the same flow, and what was made of it; those before do not.
+            self._by_flow = {}
         return self._u_b
+
+    def by_flow(self, law: Callable[[Array], Array]) -> Array:
+        """(n, ...) what a law makes of ``u_b``, once: a fit tries the others in the same flow."""
+        u_b = self.u_b
+        if law not in self._by_flow:
+            self._by_flow[law] = law(u_b)
+        return self._by_flow[law]
 
     @property
     def square_b(self) -> Array:

@@ -55,7 +55,7 @@ def test_two_jumps_are_told_and_the_six_are_those_before_them(vehicle, seed, fir
 
 
 def test_what_grows_is_no_staircase():
-    d, _ = diagnosed(concealed.BiasRamp(x=0.002, z=-0.0015), seed=7)
+    d, _ = diagnosed(concealed.BiasRamp(x=0.002, z=-0.0015), seed=7, duration=160.0)
     assert "bias_ramp" in {e.name for e in d.effects}
     assert not jumps_of(d)
 

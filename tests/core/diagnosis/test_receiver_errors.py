@@ -31,7 +31,7 @@ def told(vehicle, seed, *effects, complaints=(), duration=150.0):
 def test_an_error_that_the_filter_gets_used_to_is_the_receivers(vehicle, north, east, lasts):
     """After some seconds it passes for a velocity, and at its end for an error the other way."""
     fault = concealed.GpsFault(start=60.0, end=60.0 + lasts, north=north, east=east)
-    said, first = told(vehicle, 4711, fault)
+    said, first = told(vehicle, 4711, fault, duration=fault.end + 48.0)
     assert said.verdict is Verdict.EXPLAINED
     (effect,) = said.effects
     assert effect.name == "gps_fault"
@@ -46,7 +46,7 @@ def test_an_error_that_the_filter_gets_used_to_is_the_receivers(vehicle, north, 
 def test_a_small_error_that_is_taken_back_is_told_by_its_likelihood():
     """No more than an ordinary receiver's; the filter is used to it after a second."""
     fault = concealed.GpsFault(start=60.0, end=74.0, north=-0.5, east=0.47)
-    said, first = told("copter", 4721, fault)
+    said, first = told("copter", 4721, fault, duration=125.0)
     (effect,) = said.effects
     assert effect.name == "gps_fault"
     ((begin, end),) = effect.intervals
@@ -59,7 +59,7 @@ def test_a_small_error_that_is_taken_back_is_told_by_its_likelihood():
 def test_what_good_receivers_err_by_now_and_then_is_no_error_to_be_told():
     """However quiet this one is else, and however clearly it is seen."""
     fault = concealed.GpsFault(start=60.0, end=74.0, north=-0.26, east=0.2)
-    said, _ = told("copter", 4721, fault)
+    said, _ = told("copter", 4721, fault, duration=125.0)
     assert said.effects == ()
     c, (truth, *_) = said.calibration, random_imus(4721)
     off = np.array([*c.scale, *c.offset]) - [*truth.scale, *truth.offset]
@@ -81,7 +81,7 @@ def test_what_comes_after_a_long_fault_is_not_its_size():
 @pytest.mark.slow
 def test_a_jump_that_makes_a_receiver_look_false_is_no_fault():
     jump = concealed.BiasStep(time=70.0, x=0.7, y=-0.6, z=0.4)
-    said, _ = told("copter", 4713, jump)
+    said, _ = told("copter", 4713, jump, duration=125.0)
     (effect,) = said.effects
     assert effect.name == "bias_step"
     for axis, size in zip("xyz", (0.7, -0.6, 0.4), strict=True):
@@ -93,7 +93,7 @@ def test_a_jump_that_makes_a_receiver_look_false_is_no_fault():
 def test_a_fault_beside_a_jump_is_said_beside_it():
     fault = concealed.GpsFault(start=50.0, end=65.0, north=1.2, east=-1.1)
     jump = concealed.BiasStep(time=100.0, x=0.6, y=0.5, z=-0.4)
-    said, _ = told("copter", 4714, fault, jump, duration=170.0)
+    said, _ = told("copter", 4714, fault, jump, duration=150.0)
     effects = {effect.name: effect for effect in said.effects}
     assert set(effects) == {"bias_step", "gps_fault"}
     offset = effects["gps_fault"].unknowns["offset"]
@@ -104,7 +104,7 @@ def test_a_fault_beside_a_jump_is_said_beside_it():
 def test_an_error_that_grows_in_steps_is_told_by_its_last():
     steps = [(60.0, 0.9, -0.7), (67.0, 1.1, 0.4), (73.0, -0.5, 1.2)]
     faults = [concealed.GpsFault(start=t, end=80.0, north=n, east=e) for t, n, e in steps]
-    said, first = told("plane", 4715, *faults)
+    said, first = told("plane", 4715, *faults, duration=130.0)
     (effect,) = said.effects
     assert effect.name == "gps_fault"
     ((begin, end),) = effect.intervals
@@ -120,7 +120,7 @@ def test_two_errors_that_take_each_other_back_are_two_and_the_receiver_is_right_
         concealed.GpsFault(start=50.0, end=59.0, north=1.1, east=0.8),
         concealed.GpsFault(start=80.0, end=90.0, north=-1.1, east=-0.8),
     ]
-    said, first = told("copter", 4716, *faults)
+    said, first = told("copter", 4716, *faults, duration=138.0)
     (effect,) = said.effects
     seen = [(a + first, b + first) for a, b in effect.intervals]
     assert np.allclose(seen, [(50.0, 59.0), (80.0, 90.0)], atol=0.5)
@@ -132,7 +132,7 @@ def test_an_error_that_creeps_in_ends_where_the_receiver_jumps_back():
         concealed.GpsFault(start=60.0 + 0.2 * k, end=75.0, north=-0.03, east=0.02)
         for k in range(70)
     ]
-    said, first = told("plane", 4717, *faults)
+    said, first = told("plane", 4717, *faults, duration=125.0)
     (effect,) = said.effects
     assert effect.name == "gps_fault"
     ((_, end),) = effect.intervals

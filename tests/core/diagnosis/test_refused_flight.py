@@ -56,7 +56,7 @@ def test_a_long_false_velocity_that_the_ekf_refused_is_no_clean_flight():
 def test_a_fault_that_was_believed_in_its_middle_is_no_jump_and_ends_when_the_receiver_is_right():
     """What others doubted is true if the accelerometer has jumped: so it is asked, too."""
     fault = concealed.GpsFault(start=60.0, end=77.5, north=1.6, east=-1.55)
-    said, first = flagged(72, PROMPT, [(60.3, 67.7), (70.9, 84.7)], fault)
+    said, first = flagged(72, PROMPT, [(60.3, 67.7), (70.9, 84.7)], fault, duration=128.0)
     (effect,) = said.effects
     assert effect.name == "gps_fault"
     ((begin, end),) = effect.intervals

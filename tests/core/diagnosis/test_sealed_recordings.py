@@ -109,7 +109,7 @@ def test_a_jump_is_placed_beside_what_does_not_change_in_flight():
 
 @pytest.mark.slow
 def test_clipping_that_the_low_pass_hides_is_found_by_its_count():
-    said, _ = diagnosed("copter", 44, concealed.Saturation(limit=11.4), duration=150.0)
+    said, _ = diagnosed("copter", 44, concealed.Saturation(limit=11.4), duration=125.0)
     effect = next(e for e in said.effects if e.name == "saturation")
     assert effect.unknowns["limit"].value == pytest.approx(11.4, rel=0.1)
     assert effect.intervals
@@ -168,7 +168,7 @@ def test_a_copters_jump_does_not_pass_for_noise_and_is_said_to_be_on_its_axis():
 def test_a_jump_from_which_dead_reckoning_runs_away_is_no_fault_of_the_receiver():
     step = concealed.BiasStep(time=80.0, x=0.7, y=-0.7, z=0.35)
     arm = concealed.GpsLeverArm(x=1.0, y=-0.5, z=0.3)
-    said, first = diagnosed("plane", 131183, step, arm, duration=170.0)
+    said, first = diagnosed("plane", 131183, step, arm, duration=135.0)
     assert {e.name for e in said.effects} == {"bias_step", "gps_lever_arm"}
     found = next(e for e in said.effects if e.name == "bias_step")
     assert abs(found.unknowns["time"].value + first - step.time) < 2.0
@@ -181,7 +181,7 @@ def test_a_far_antenna_does_not_make_latency_and_averaging_run_away():
     # A copter that hovers and swings: the arm accelerates the antenna more than the flight does.
     arm = concealed.GpsLeverArm(x=0.8, y=-0.5, z=-0.4)
     imus = random_imus(6)
-    said, _ = diagnosed("copter", 6, arm, duration=150.0, imus=imus, gps=GpsTruth())
+    said, _ = diagnosed("copter", 6, arm, duration=125.0, imus=imus, gps=GpsTruth())
     found = next(e for e in said.effects if e.name == "gps_lever_arm")
     for axis in "xyz":
         q = found.unknowns[axis]

@@ -133,7 +133,7 @@ def test_its_curve_is_drawn_with_its_shape_and_said_by_its_range():
 )
 def test_warming_up_along_a_curve_is_told_as_temperature(vehicle, square, cube):
     drift = concealed.TemperatureDrift(square=square, cube=cube)
-    samples = simulated(vehicle, 240.0, seed=14, imu=IMU, effects=[drift])[0]
+    samples = simulated(vehicle, 190.0, seed=14, imu=IMU, effects=[drift])[0]
     found = answer(fed(samples), 1)
     assert found.calibration.status is not Status.CALIBRATED
     (told,) = [e for e in found.diagnosis.effects if e.name != "gps_latency"]
@@ -171,6 +171,6 @@ def test_the_offset_at_a_reference_that_was_not_flown_is_no_surer_than_its_curve
 @pytest.mark.slow
 def test_growth_with_time_is_no_curve_over_a_temperature_that_grows_as_well():
     ramp = concealed.BiasRamp(x=2e-3, y=-2e-3, z=2e-3)
-    samples = simulated("copter", 240.0, seed=14, imu=IMU, effects=[ramp])[0]
+    samples = simulated("copter", 190.0, seed=14, imu=IMU, effects=[ramp])[0]
     (told,) = [e for e in answer(fed(samples), 1).diagnosis.effects if e.name != "gps_latency"]
     assert told.name == "bias_ramp"

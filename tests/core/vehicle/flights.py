@@ -150,7 +150,7 @@ def followed(commands, lag):
 def plane_flight(
     *,
     seed=1,
-    seconds=240.0,
+    seconds=180.0,
     wind=(0.0, 0.0),
     c_lift_0=0.56,
     c_lift_a=6.9,

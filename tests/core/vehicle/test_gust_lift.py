@@ -47,7 +47,7 @@ def shaken(flight, gusts, samples=16):
 
 
 def test_the_mean_force_is_that_over_the_angles():
-    flight = shaken(plane_flight(seed=3, noise=0.0), 1.5)
+    flight = shaken(plane_flight(seed=3, seconds=240.0, noise=0.0), 1.5)
     model = plane_model(flight, FRAME, SIGMA)
     theta = model.nominal
     theta[model.index("gust_lift")] = 1.0
@@ -61,7 +61,7 @@ def test_the_mean_force_is_that_over_the_angles():
 
 
 def test_less_drag_in_fast_gusts_is_no_smaller_drag():
-    flight = shaken(plane_flight(seed=4, reading=1.0), 2.0)
+    flight = shaken(plane_flight(seed=4, seconds=240.0, reading=1.0), 2.0)
     told = matched(flight)
     assert not {"drag", "thrust_scale"} & names(told)
     drag = told.numbers["drag.c_drag_p"]
@@ -72,7 +72,7 @@ def test_less_drag_in_fast_gusts_is_no_smaller_drag():
 
 
 def test_vibration_that_is_no_gust_takes_no_drag_away():
-    flight = plane_flight(seed=5, reading=1.0)
+    flight = plane_flight(seed=5, seconds=240.0, reading=1.0)
     rough = replace(flight, shaken=np.full(len(flight), 3.0**2))
     drags = [matched(f).numbers["drag.c_drag_p"] for f in (flight, rough)]
     assert abs(drags[0].real - drags[1].real) < drags[0].sigma
@@ -80,7 +80,7 @@ def test_vibration_that_is_no_gust_takes_no_drag_away():
 
 
 def test_drag_that_is_another_is_told_in_fast_gusts():
-    flight = shaken(plane_flight(seed=6, reading=1.0, c_drag_p=0.16), 1.0)
+    flight = shaken(plane_flight(seed=6, seconds=240.0, reading=1.0, c_drag_p=0.16), 1.0)
     told = matched(flight)
     assert "drag" in names(told)
     drag = told.numbers["drag.c_drag_p"]

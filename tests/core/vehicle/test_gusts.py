@@ -16,7 +16,8 @@ SIGMA = np.array([0.003, 0.003, 0.01])
 
 
 def matched(**change):
-    match = match_plane(plane_flight(reading=1.0, **change), PlaneAirframe(), SIGMA)
+    flight = plane_flight(reading=1.0, seconds=240.0, **change)
+    match = match_plane(flight, PlaneAirframe(), SIGMA)
     assert match is not None
     return match
 
@@ -152,7 +153,7 @@ def test_a_lift_between_nothing_and_what_can_be_named_is_not_called_explained():
 @pytest.mark.slow
 def test_gusts_explain_no_more_than_gusts_of_their_size_do():
     """A force to the side that wanders, thrice what gusts of 0.8 m/s make of it."""
-    flight = plane_flight(reading=1.0, gusts=0.8, seed=3)
+    flight = plane_flight(reading=1.0, seconds=240.0, gusts=0.8, seed=3)
     force = 8.0 * smooth(np.random.default_rng(1), len(flight), 1.0)
     f_b = flight.f_b + force[:, None] * (0.0, 1.0, 0.0)
     match = match_plane(replace(flight, f_b=f_b), PlaneAirframe(), SIGMA)
@@ -165,7 +166,7 @@ def test_gusts_explain_no_more_than_gusts_of_their_size_do():
 @pytest.mark.parametrize(("sigma", "named"), [(0.01, True), (0.4, False)])
 def test_what_an_airspeed_sensor_reads_beyond_a_velocity_that_is_off_is_no_gust(sigma, named):
     """An error of the velocity looks like air to the sensor; how large it may be is known."""
-    flight = plane_flight(seed=17, reading=1.0)
+    flight = plane_flight(seed=17, seconds=240.0, reading=1.0)
     rng = np.random.default_rng(3)
     wrong = np.stack([smooth(rng, len(flight), 0.35, 5.0) for _ in range(3)], axis=1)
     flight.v_n[:] += wrong

@@ -27,7 +27,7 @@ def upwards(flight, coefficient):
 
 
 def test_lift_that_bends_is_no_air_and_its_line_is_told():
-    flight = plane_flight(seed=41, angles=0.04)
+    flight = plane_flight(seed=41, seconds=240.0, angles=0.04)
     bent = upwards(flight, lambda alpha: -40.0 * (alpha + 0.03) ** 2)
     match = matched(bent)
     assert "no line over the angle of attack" in match.note
@@ -49,7 +49,7 @@ def test_a_wind_that_is_another_one_higher_up_is_no_gust():
 
 
 def test_an_airspeed_that_is_off_by_as_much_at_every_speed_has_no_other_scale():
-    flight = plane_flight(seed=43, reading=1.0)
+    flight = plane_flight(seed=43, seconds=240.0, reading=1.0)
     flight.airspeed[:] += 1.5
     match = matched(flight)
     assert names(match) == set()
@@ -88,7 +88,8 @@ def test_a_plane_that_hardly_slips_shows_no_side_force_and_its_wind_is_right():
 
 def test_without_outputs_nothing_is_said_of_the_side_force():
     """A rudder that nobody recorded goes with the sideslip."""
-    flight = replace(plane_flight(seed=45, c_y_b=-0.4), commands=np.zeros((2400, 0)))
+    whole = plane_flight(seed=45, c_y_b=-0.4)
+    flight = replace(whole, commands=np.zeros((len(whole), 0)))
     match = matched(flight)
     assert "side_force" not in names(match)
     assert "no rudder output" in {n.name: n.why for n in match.not_testable}["side_force"]

@@ -131,13 +131,13 @@ def test_thrust_that_differs_is_not_exchanged_for_drag(seed, rival):
 def test_drag_is_known_no_better_than_the_law_of_the_propeller():
     """What bends the line is drag to the fit: its sigma says so, where there is such a line."""
     straight, bent = (
-        matched(plane_flight(seed=13, lost=0.02, bend=bend)).numbers["drag.c_drag_p"]
+        matched(plane_flight(seed=13, seconds=240.0, lost=0.02, bend=bend)).numbers["drag.c_drag_p"]
         for bend in (0.0, 0.3)
     )
     shift = 0.3 * 0.02**2 * 9.80665 / 0.7 / (0.5 * 1.14 * (1.14 / 1.225) * 0.45 / 2.0)
     assert bent.real - straight.real == pytest.approx(shift, rel=0.2)
     assert shift == pytest.approx(bent.sigma, rel=0.3)
-    none = matched(plane_flight(seed=13)).numbers["drag.c_drag_p"]
+    none = matched(plane_flight(seed=13, seconds=240.0)).numbers["drag.c_drag_p"]
     assert none.sigma < 0.3 * shift
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.air import Air, speed_of
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
 from onboard.core.vehicle.effects.effect import Effect, Shown, Unknown
 
@@ -34,9 +34,9 @@ def seen_by_a_pitot(u_b: Array) -> Array:
     Args:
         u_b: (n, 3) velocity through the air in body axes, m/s.
     """
-    angle = np.arctan2(np.linalg.norm(u_b[:, 1:], axis=1), u_b[:, 0])
+    angle = np.arctan2(speed_of(u_b[:, 1:]), u_b[:, 0])
     beyond = np.clip((angle - PITOT_RAD) / (0.5 * np.pi - PITOT_RAD), 0.0, 1.0)
-    out: Array = np.linalg.norm(u_b, axis=1) * np.cos(0.5 * np.pi * beyond)
+    out: Array = speed_of(u_b) * np.cos(0.5 * np.pi * beyond)
     return out
 
 
@@ -59,7 +59,7 @@ class AirspeedScale(Effect):
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Predict the reading."""
-        seen = seen_by_a_pitot(air.u_b)
+        seen = air.by_flow(seen_by_a_pitot)
         air.force_b[:, COLUMN] += values[0] * seen * np.sqrt(air.rho / SEA_LEVEL_DENSITY)
 
     def shown(self, values: Sequence[float], sigmas: Sequence[float]) -> list[Shown]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.air import Air, speed_of
 from onboard.core.vehicle.effects.effect import Effect, Unknown
 from onboard.core.vehicle.plane_airframe import PlaneAirframe
 
@@ -44,9 +44,8 @@ class Lift(Effect):
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the lift, and keep its coefficient for the drag that it induces."""
         u = air.u_b
-        speed = np.linalg.norm(u, axis=1)
         air.alpha = np.arctan2(u[:, 2], u[:, 0])
-        air.pressure = self._frame.pressure(air.rho, speed)
+        air.pressure = self._frame.pressure(air.rho, air.by_flow(speed_of))
         air.lift, air.slope = values[0] + values[1] * air.alpha, values[1]
         # What the angle scatters by is of the air, whatever slope is tried for the wing.
         air.scatter = self._frame.scatter(air.shaken, air.pressure)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import ByStep, Unknown
@@ -25,4 +23,5 @@ class SensorOffset(ByStep):
 
     def act_by(self, air: Air, values: Sequence[Array]) -> None:
         """Add it."""
-        air.force_b[:, :3] += np.stack(values, axis=1)
+        for axis, its in enumerate(values):
+            air.force_b[:, axis] += its

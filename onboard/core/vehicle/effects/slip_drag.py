@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.effect import Effect, Unknown
 
@@ -14,6 +15,12 @@ PLAUSIBLE = 0.5
 STRAIGHT = 0.2
 """Likewise by a radian: a light plane's in simulators that take it so (JSBSim's c172p: 0.17)
 [data sheet]."""
+
+
+def _slip(u_b: Array) -> Array:
+    """(n,) size of the angle of sideslip, rad."""
+    out: Array = np.abs(np.arctan2(u_b[:, 1], u_b[:, 0]))
+    return out
 
 
 class SlipDrag(Effect):
@@ -35,5 +42,5 @@ class SlipDrag(Effect):
 
     def act(self, air: Air, values: Sequence[float]) -> None:
         """Add the drag."""
-        slip = np.abs(np.arctan2(air.u_b[:, 1], air.u_b[:, 0]))
+        slip = air.by_flow(_slip)
         air.force_b[:, 0] -= air.pressure * (values[0] * slip + values[1]) * slip
