@@ -127,6 +127,7 @@ JUDGED: tuple[str, ...] = (
     "2026-11-26-2",
     "2026-11-27",
     "2026-11-27-2",
+    "2026-11-30",
 )
 """Releases that have been judged."""
 
