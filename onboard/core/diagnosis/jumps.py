@@ -52,25 +52,47 @@ class Looked:
 
 
 def jumps_anywhere(full: Examination) -> list[Looked]:
-    """Jumps at moments all over the flight.
-
-    Those about the best one once more, as the flight is with a jump there: what is far from nothing
-    bends a flight that is taken for one without jumps, and another moment may be better.
-    """
+    """Jumps at moments all over the flight, as it is without any."""
     moments = np.arange(settled_from(full.blocks), full.blocks[-1].end - SCAN_S, SCAN_S).tolist()
     if not moments:
         return []
     found = Stepped(full, moments)
-    out = [Looked(*x) for x in zip(moments, found.gain.tolist(), found.known, strict=True)]
-    best = int(np.argmax(found.gain))
+    return [Looked(*x) for x in zip(moments, found.gain.tolist(), found.known, strict=True)]
+
+
+def surprising(full: Examination, looked: Sequence[Looked], score: float) -> list[Looked]:
+    """A scan in which a jump is as surprising as ``score``, looked at again; else nothing of it.
+
+    Between its moments a jump may explain twice what it explains at either (:data:`SCAN_S`).
+    """
+    if not looked or surprise(2.0 * best_of(looked).gain, 3, len(looked)) < score:
+        return []
+    again = _looked_again(full, looked)
+    return [] if surprise(best_of(again).gain, 3, len(again)) < score else again
+
+
+def _looked_again(full: Examination, looked: Sequence[Looked]) -> list[Looked]:
+    """A scan whose moments about the best one are looked at as the flight is with a jump there.
+
+    What is far from nothing bends a flight that is taken for one without jumps, and another moment
+    may be better.
+    """
+    best = int(np.argmax([at.gain for at in looked]))
     about = slice(max(best - ONCE_MORE // 2, 0), best + ONCE_MORE // 2 + 1)
+    moments = [at.moment for at in looked[about]]
     jump = BiasStep(Origin(full.point.skew_from))
-    fitter, before, fits = fitted(full, (), [jump.at(t) for t in moments[about]])
+    fitter, before, fits = fitted(full, (), [jump.at(t) for t in moments])
+    out = list(looked)
     out[about] = [
         Looked(t, fitter.gain(before, after), np.diag(fitter.informed(after, index)))
-        for t, (index, after) in zip(moments[about], fits, strict=True)
+        for t, (index, after) in zip(moments, fits, strict=True)
     ]
     return out
+
+
+def best_of(looked: Sequence[Looked]) -> Looked:
+    """The one of a scan, not empty, that explains most."""
+    return max(looked, key=lambda at: at.gain)
 
 
 def shown_from(
@@ -94,7 +116,7 @@ def reach_of_scan(looked: Sequence[Looked]) -> float:
     makes one that comes later look nearly as good.  So all that explain half of the best one are
     looked at again, as far as a jump is told.
     """
-    best = max(looked, key=lambda at: at.gain)
+    best = best_of(looked)
     apart = [abs(at.moment - best.moment) for at in looked if at.gain >= best.gain / 2.0]
     return min(max(SCAN_S, *apart), FORGOTTEN_S)
 

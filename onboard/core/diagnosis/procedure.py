@@ -22,6 +22,7 @@ from onboard.core.diagnosis.given_up import GivenUp
 from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
     alike,
+    best_of,
     candidate_of,
     candidates_of,
     explains,
@@ -32,6 +33,7 @@ from onboard.core.diagnosis.jumps import (
     reach_of_scan,
     shock_instead,
     shown_from,
+    surprising,
 )
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.nuisance_rivals import compared
@@ -349,12 +351,10 @@ def _jump(full: Examination, choice: Choice, asked: _Asked) -> BiasStep | None:
         return None
     looked = jumps_anywhere(full)
     choice.jump_from = shown_from(full, looked, choice.fitter.pool, asked.companions, asked.imu)
+    looked = surprising(full, looked, -inf if _wanders(choice) else -2.0 * log(SEARCHED))
     if not looked:
         return None
-    best = max(looked, key=lambda at: at.gain)
-    if not _wanders(choice) and surprise(best.gain, 3, len(looked)) < -2.0 * log(SEARCHED):
-        return None
-    jump = jump_near(full, (), best.moment, reach_of_scan(looked))
+    jump = jump_near(full, (), best_of(looked).moment, reach_of_scan(looked))
     beside = _steady(choice)
     if beside and any(c.jump for c in choice.chosen):
         jump = jump_near(full, beside, jump.moment, reach_of_scan(looked))

@@ -24,14 +24,16 @@ from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice, choose
 from onboard.core.diagnosis.jumps import (
     alike,
+    best_of,
     candidate_of,
     candidates_of,
     jump_near,
     jumps_anywhere,
     reach_of_scan,
+    surprising,
 )
 from onboard.core.diagnosis.limits import CLEARLY, SCAN_S
-from onboard.core.diagnosis.score import least, surprise
+from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.physics.effect import Effect, Origin
 from onboard.core.physics.effects.bias_step import BiasStep
@@ -174,13 +176,10 @@ def _of_both_kinds(choice: Choice) -> bool:
 def _second(full: Examination, first: Jump) -> BiasStep | None:
     """The jump that explains most beside another one, if that is no chance."""
     with_first = full.carrying(first, tuned=False)
-    looked = jumps_anywhere(with_first)
+    looked = surprising(with_first, jumps_anywhere(with_first), least())
     if not looked:
         return None
-    best = max(looked, key=lambda at: at.gain)
-    if surprise(best.gain, 3, len(looked)) < least():
-        return None
-    return jump_near(with_first, (), best.moment, reach_of_scan(looked))
+    return jump_near(with_first, (), best_of(looked).moment, reach_of_scan(looked))
 
 
 def _chosen(
