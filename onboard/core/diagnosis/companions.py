@@ -203,8 +203,7 @@ def _steady(windows: SharedWindows, a: Companion, b: Companion) -> _Pair:
             np.sum([getattr(axis, name) for axis in pair.axes], axis=0) for name in ("gain", "odd")
         )
         most = float(np.max(gain[EDGE:], initial=0.0))
-        score = np.array([surprise(x, 3, len(odd)) for x in odd])
-        kept = (score < least()) | (odd <= most)
+        kept = np.array([x <= most or surprise(x, 3, len(odd)) < least() for x in odd.tolist()])
         if kept.all() or kept.sum() < FEWEST_WINDOWS:
             return pair
         windows = windows.where(kept)
