@@ -13,7 +13,7 @@ from onboard.core.diagnosis.effort import FORGOTTEN_S, MOST_AT_ONCE
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.limits import SCAN_S
 from onboard.core.diagnosis.procedure import diagnose
-from onboard.core.diagnosis.score import Peak, time_sigma
+from onboard.core.diagnosis.score import Peak, surprise, time_sigma
 from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.stepped import JumpingPass, Places, Stepped
 from onboard.core.estimate.calibration_model import calibration_model
@@ -246,3 +246,41 @@ def test_a_blow_just_before_the_end_of_a_flight_is_no_jump():
     assert np.abs(np.subtract(c.offset, spec.imus[0].offset)) == pytest.approx(
         np.zeros(3), abs=4.0 * max(c.offset_sigma)
     )
+
+
+def test_moments_compare_whatever_pass_they_are_in(monkeypatch):
+    """Each pass refuses other fixes, so that what all jumps explain in it is more or less."""
+    passes = []
+
+    def fitted(_full, _chosen, steps):
+        passes.append(len(steps))
+        level = 500.0 * (-1.0) ** len(passes)
+        fits = [([], level - (s.moment - 71.0) ** 2) for s in steps]
+        gain = lambda before, after: after - before  # noqa: E731
+        return SimpleNamespace(gain=gain, pool=SimpleNamespace(variance=1.0)), 0.0, fits
+
+    monkeypatch.setattr(jumps, "fitted", fitted)
+    t = np.arange(0.0, 140.0, 2.0)
+    found = jumps._scaled(None, (), [BiasStep(Origin(0.0)).at(x) for x in t.tolist()])
+    assert len(passes) > 2
+    assert max(passes) <= MOST_AT_ONCE
+    np.testing.assert_allclose(found, -500.0 - (t - 71.0) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("at_first", "again", "found"), [(10.0, 60.0, False), (22.0, 60.0, True), (22.0, 10.0, False)]
+)
+def test_a_scan_is_looked_at_again_where_twice_of_it_is_no_chance(
+    monkeypatch, at_first, again, found
+):
+    asked = []
+
+    def looked_again(_full, _looked):
+        asked.append(again)
+        return scan(lambda _: again)
+
+    monkeypatch.setattr(jumps, "_looked_again", looked_again)
+    least = surprise(40.0, 3, len(scan(np.ones_like)))  # of a gain between one of 22 and its double
+    assert bool(jumps.surprising(None, scan(lambda _: at_first), least)) == found
+    assert bool(asked) == (2.0 * at_first > 40.0)
+    assert jumps.surprising(None, [], least) == []
