@@ -251,8 +251,11 @@ class Judge:
         used = [float(b.fixes.t[b.trusted][-1]) for b in self.engine.batches if b.trusted.any()]
         if max(used, default=t0) - t0 > end + LONG_S:
             return ()
-        since = f"from {far[0].start_s:.0f} s on this accelerometer and GPS contradict each other"
-        return (Inconstant(BiasStep.effect, f"{since}, and nothing tells which of them is false"),)
+        words = (
+            f"from {far[0].start_s:.0f} s on GPS is far from this accelerometer and its attitude, "
+            "and nothing tells which is false"
+        )
+        return (Inconstant(BiasStep.effect, words),)
 
     def _ambiguous(self, effects: list[Finding]) -> tuple[Ambiguity, ...]:
         by_name = {f.effect: f for f in self.final.families}

@@ -51,7 +51,7 @@ def test_an_accelerometer_that_came_off_for_good_is_not_calibrated():
     said = given.diagnosis
     assert said.verdict is Verdict.PARTLY_EXPLAINED
     assert said.calibration.status is Status.INSUFFICIENT
-    assert given.missing.startswith("from 90 s on this accelerometer and GPS contradict")
+    assert given.missing.startswith("from 90 s on GPS is far from this accelerometer")
     (unused,) = said.unused
     assert (unused.reason, unused.contradicted) == ("ekf_gps_glitch", True)
 
