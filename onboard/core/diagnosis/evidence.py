@@ -59,6 +59,8 @@ CUT = "the accelerometer clipped nearly all the time, so that nothing is known o
 class Evidence:
     """The models: everything, what was chosen of it, the one that is reported, what is in doubt.
 
+    ``about`` is what was chosen by sums about the jumps of the reported model.
+
     ``companions`` are all accelerometers of the vehicle; ``believed`` is the number of fixes of the
     flight that were to be used, ``unused`` flight without any; ``sampled`` is the flight as it was
     sampled, but for what is false; ``clipped`` if the accelerometer was at its rail so much of it
@@ -68,6 +70,7 @@ class Evidence:
 
     full: Examination
     choice: Choice
+    about: Choice
     final: Examination
     families: tuple[Effect, ...]
     doubts: Mapping[str, Sequence[str]]
@@ -96,7 +99,7 @@ class Judge:
         self.calibrator, self.imu, self.evidence = calibrator, imu, evidence
         self.engine, self.choice, self.sampled = evidence.final, evidence.choice, evidence.sampled
         self.absent, self.excluded = list(absent), list(excluded)
-        self.undecided = undecided(evidence.choice, evidence.families)
+        self.undecided = undecided(evidence.about, evidence.families)
         self.left_open = left_open(self.undecided) + _unsteady(evidence)
         made = calibrator.calibration_with(imu, evidence.final, self.left_open)
         self.calibration: Calibration = made.untold(CUT) if evidence.clipped else made

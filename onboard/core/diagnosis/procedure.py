@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log
 
+from onboard.core.diagnosis.about_jumps import about_jumps
 from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot, unused_of
 from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.effort import FURTHEST, SEARCHED
@@ -106,6 +107,7 @@ def examine(
         Evidence(
             stands.full,
             stands.choice,
+            about_jumps(stands.full, stands.choice, stands.final, stands.families),
             stands.final,
             tuple(stands.families),
             stands.rivals,
