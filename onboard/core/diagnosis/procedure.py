@@ -45,7 +45,7 @@ from onboard.core.diagnosis.selection import Fitter
 from onboard.core.diagnosis.settling import families_of, only, opened, settled
 from onboard.core.diagnosis.shadows import without_shadows
 from onboard.core.diagnosis.twice import jumped_twice
-from onboard.core.diagnosis.wander import Wandering, still_wanders, wandering
+from onboard.core.diagnosis.wander import still_wanders, wandering
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.limits import FEWEST_BLOCKS
 from onboard.core.inputs.clock_rates import most_growth
@@ -94,30 +94,25 @@ def examine(
     if not clear.clipped:
         clear, stands = _with_given_up(clear, stands, asked, origin, calibrator)
     # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
-    wander = None
     if clear.fault is None:
-        wander = wandering(
-            stands.full, stands.families, stands.final, origin, calibrator.parameters
-        )
-    if wander is not None:
-        stands = _beside_wander(stands, wander, asked, origin, calibrator, clear)
+        stands = _beside_wander(clear, stands, asked, origin, calibrator)
     return Judge(
         calibrator,
         imu,
         Evidence(
-            stands.full,
-            stands.choice,
-            about_jumps(stands.full, stands.choice, stands.final, stands.families),
-            stands.final,
-            tuple(stands.families),
-            stands.rivals,
-            companions,
-            believed(clear.sampled, calibrator.trust.refusals),
-            unused_of(clear, flight, calibrator, origin, stands.final),
-            clear.as_sampled,
-            clear.clipped,
-            clear.heard,
-            clear.at_odds,
+            full=stands.full,
+            choice=stands.choice,
+            about=about_jumps(stands.full, stands.choice, stands.final, stands.families),
+            final=stands.final,
+            families=tuple(stands.families),
+            doubts=stands.rivals,
+            companions=companions,
+            believed=believed(clear.sampled, calibrator.trust.refusals),
+            unused=unused_of(clear, flight, calibrator, origin, stands.final),
+            sampled=clear.as_sampled,
+            clipped=clear.clipped,
+            heard=clear.heard,
+            at_odds=clear.at_odds,
         ),
         origin,
         clear.absent,
@@ -180,17 +175,16 @@ def _with_given_up(
 
 
 def _beside_wander(
-    stands: _Stands,
-    found: Wandering,
-    asked: _Asked,
-    origin: Origin,
-    calibrator: Calibrator,
-    clear: Cleared,
+    clear: Cleared, stands: _Stands, asked: _Asked, origin: Origin, calibrator: Calibrator
 ) -> _Stands:
-    """The model with an offset that wanders.
+    """The model with an offset that wanders, if it does.
 
     What was chosen without it is chosen anew where it does not stand, or does not explain all.
     """
+    model = stands.full, stands.families, stands.final
+    found = wandering(*model, origin, calibrator.parameters)
+    if found is None:
+        return stands
     families = [*found.kept, found.wander]
     if found.settled:
         return replace(stands, final=found.made, families=families)
