@@ -19,7 +19,7 @@ from typing import Final
 from onboard.core.diagnosis.cleared import Cleared
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.records import Unused
-from onboard.core.diagnosis.refusals import Refused, contradicted, refused
+from onboard.core.diagnosis.refusals import Refused, contradicted, overlaps, refused
 from onboard.core.diagnosis.screening import heard, unbelieved
 from onboard.core.estimate.calibrator import Calibrator
 from onboard.core.estimate.engine import Engine
@@ -56,7 +56,7 @@ class GivenUp:
         """
         far = contradicted(made.batches, made.refused_velocities(), None, self._t0)
         spans = [(r.start - self._t0, r.end - self._t0) for r in self.stretches]
-        return tuple(u for u in far if any(a < u.end_s and b > u.start_s for a, b in spans))
+        return tuple(u for u in far if overlaps(u.start_s, u.end_s, spans))
 
     def gone_through(self, final: Examination) -> Examination:
         """A model with the receiver believed there, but for what is known to be false of it.

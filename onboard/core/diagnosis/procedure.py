@@ -181,8 +181,8 @@ def _beside_wander(
 
     What was chosen without it is chosen anew where it does not stand, or does not explain all.
     """
-    model = stands.full, stands.families, stands.final
-    found = wandering(*model, origin, calibrator.parameters)
+    parameters = calibrator.parameters
+    found = wandering(stands.full, stands.families, stands.final, origin, parameters)
     if found is None:
         return stands
     families = [*found.kept, found.wander]

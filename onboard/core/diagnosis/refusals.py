@@ -58,6 +58,11 @@ def within(t: Array, intervals: Sequence[tuple[float, float]]) -> NDArray[np.boo
     return inside
 
 
+def overlaps(start: float, end: float, intervals: Sequence[tuple[float, float]]) -> bool:
+    """Whether a stretch has some time in common with one of the intervals."""
+    return any(a < end and b > start for a, b in intervals)
+
+
 def refused(batches: Sequence[Batch], refusals: Sequence[RefusedFixes]) -> list[Refused]:
     """Flight that was not used, in order of time, each segment with one reason.
 
@@ -125,8 +130,7 @@ def unused_flight(
     out = []
     for r in refused(batches, refusals):
         start, end = r.start - t0, r.end - t0
-        said = any(a < end and b > start for a, b in far)
-        contradicted = said if asked and r.reason in OPINIONS else None
+        contradicted = overlaps(start, end, far) if asked and r.reason in OPINIONS else None
         out.append(Unused(start, end, r.reason.value, contradicted))
     return tuple(out)
 
@@ -152,7 +156,7 @@ def contradicted(
         first, last = float(spell[0]), float(spell[-1])
         whole = int(np.sum((t >= first) & (t <= last)))
         start, end = first - t0, last - t0
-        told = any(a < end and b > start for a, b in known)
+        told = overlaps(start, end, known)
         if last - first >= LONG_S and len(spell) > whole / 2 and not told:
             out.append(Unused(start, end, "refused"))
     return tuple(out)
