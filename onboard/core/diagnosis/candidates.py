@@ -72,10 +72,17 @@ class Candidate:
         seen = self.witness.gain - self._unseen(fitter, after, self.witness)
         return surprise(seen + gain.weakened, unknowns, self.witness.places)
 
-    def merit(self, fitter: Fitter, before: Fit, after: Fit) -> float:
-        """The score, of what cannot be only by as much as it is clearly more than of what can."""
-        score = self.score(fitter, before, after)
-        return score if possible(fitter, after, self) else score - CLEARLY
+    def beyond_need(self, fitter: Fitter, before: Fit, after: Fit) -> float:
+        """What it explains beyond what it would need to count as found.
+
+        In units of chi-square and of one variance, that of the flight, so that effects may be
+        compared; what others have seen counts with it.
+        """
+        explained = fitter.gain(before, after) / max(fitter.pool.variance, 1.0)
+        if self.witness is None:
+            return explained - needed(len(self.index), self.places)
+        explained += self.witness.gain - self._unseen(fitter, after, self.witness)
+        return explained - needed(len(self.index), self.witness.places)
 
     def margin(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """By how much a jump is rather one of this accelerometer than of another one.

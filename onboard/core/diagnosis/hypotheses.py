@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
+from onboard.core.diagnosis.forms import beyond_need, merit
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
@@ -92,18 +94,19 @@ def confounders_of(
     """
     before = fitter.fit(rest, held, held_out=False)
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
-    own = target.score(fitter, before, with_it)
+    own = beyond_need(fitter, rest, target, held)
     nearest: dict[str, Confounder] = {}
     for other in (o for o in others if o.new_beside(rest)):
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
-        score = other.score(fitter, before, instead)
-        if score < least() or not possible(fitter, instead, other):
+        found = other.score(fitter, before, instead) >= least()
+        if not found or not possible(fitter, instead, other):
             continue
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
         if other.score(fitter, with_it, both) >= least():
             continue
-        if other.effect not in nearest or own - score < nearest[other.effect].delta_bic:
-            nearest[other.effect] = Confounder(other.effect, own - score)
+        behind = own - beyond_need(fitter, rest, other, held)
+        if other.effect not in nearest or behind < nearest[other.effect].delta_bic:
+            nearest[other.effect] = Confounder(other.effect, behind)
     return sorted(nearest.values(), key=lambda c: c.delta_bic)
 
 
@@ -127,12 +130,12 @@ def choose(
         offered = choice.besides(choice.chosen) + ([step] if step is not None else [])
         offered = _in_question(wide, choice.free, offered)
         before = wide.fit(choice.free)
-        best, most = None, least()
+        best, most = None, -inf
         for c in offered:
             after = wide.fit([*choice.free, *c.index])
-            score = c.merit(wide, before, after)
-            if score >= most and accepted(wide, before, after, c):
-                best, most = c, score
+            if accepted(wide, before, after, c):
+                better = merit(wide, choice.free, c, after)
+                best, most = (c, better) if better > most else (best, most)
         if best is None:
             break
         if best is step:
@@ -159,16 +162,15 @@ def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bo
     fitter = choice.fitter
     rest = [i for i in choice.free if i not in nuisances.index]
     before = fitter.fit(rest, held)
-    with_it = fitter.fit([*rest, *nuisances.index], held, held_out=False)
-    better = max(nuisances.score(fitter, before, with_it), least())
+    better = beyond_need(fitter, rest, nuisances, held)
     taken: Candidate | None = None
     for other in choice.besides(choice.chosen):
         if other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
-        score = other.score(fitter, before, after)
-        if score > better and accepted(fitter, before, after, other):
-            better, taken = score, other
+        its = beyond_need(fitter, rest, other, held)
+        if its > better and accepted(fitter, before, after, other):
+            better, taken = its, other
     if taken is None:
         return False
     choice.chosen.append(taken)
@@ -253,12 +255,12 @@ def _reconsider(choice: Choice) -> None:
         if c.score(fitter, before, with_it) < least():
             choice.chosen.remove(c)
             continue
-        better, most = c, c.merit(fitter, before, with_it) + CLEARLY
+        better, most = c, merit(fitter, rest, c, with_it) + CLEARLY
         others = choice.besides([o for o in choice.chosen if o is not c])
         for other in _in_question(fitter, rest, [c, *(o for o in others if o is not c)]):
             if other is not c:
                 after = fitter.fit([*rest, *other.index])
-                its = other.merit(fitter, before, after)
+                its = merit(fitter, rest, other, after)
                 if its > most and accepted(fitter, before, after, other):
                     better, most = other, its
         choice.chosen[choice.chosen.index(c)] = better

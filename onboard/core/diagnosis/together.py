@@ -10,8 +10,9 @@ hypothesis for all flights.  What each says of the unknowns of an effect is adde
 and is scored once: no more of it than what explains flights by the size that the others ask for,
 weakened by as much as they scatter about ``e`` beyond chance.  By the
 odds of that, the mean is off by what the flights' own answers are off by, ``sum I_i J_i e`` over
-``sum I_i``, with ``I_i`` what a flight knows of the six and ``J_i`` how the effect moves them there
-(a mixture of models, as in :mod:`~onboard.core.diagnosis.undecided`).
+``sum I_i``, with ``I_i`` what a flight knows of the six and ``J_i`` how the effect moves them
+there, and known worse by what ``N`` leaves open of ``e`` (a mixture of models, as in
+:mod:`~onboard.core.diagnosis.undecided`).
 """
 
 from __future__ import annotations
@@ -137,13 +138,15 @@ def _model(told: Sequence[tuple[Asked, Array]], known: Array) -> tuple[float, Un
     N = said.information.sum(axis=0) + np.diag(first.prior)
     vector = said.vector.sum(axis=0)
     e = np.linalg.solve(N, vector)
-    gain = min(float(e @ vector), _elsewhere(said, N, vector)) / _scatter(said, e)
-    moved = np.sum([six @ (a.moves @ e) for a, six in told], axis=0)
-    moves = np.linalg.solve(np.sum([six for _, six in told], axis=0) + known, moved)
+    scatter = _scatter(said, e)
+    gain = min(float(e @ vector), _elsewhere(said, N, vector)) / scatter
     odds = log_odds(surprise(gain, len(e)))
     if odds < log(HARDLY):
         return None
-    return odds, Undecided(first.effect, first.title, 1.0, moves)
+    moved = np.sum([six @ a.moves for a, six in told], axis=0)
+    J = np.linalg.solve(np.sum([six for _, six in told], axis=0) + known, moved)
+    wider = scatter * J @ np.linalg.solve(N, J.T)
+    return odds, Undecided(first.effect, first.title, 1.0, J @ e, wider)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 Where an effect is at the edge of what counts as found, two models of the flight are likely, and
 each gives the six with a sigma that knows nothing of the other: a curvature of the scale that was
 just missed put the z scale of a plane ten sigma off.  The variance of a mixture is what its models
-say, and what they differ by (Draper, 1995).
+say, and what they differ by (Draper, 1995): one that knows a number worse has its share in that.
 
 What counts as found is set by how seldom a false name may be said, which is not how likely an
 effect is.  A score is twice a logarithm of a probability ``p`` by chance; at the most, such a ``p``
@@ -20,6 +20,7 @@ from math import exp, log
 import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate, believable
+from onboard.core.diagnosis.forms import beyond_need
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.limits import CLEARLY, HARDLY, PRESENT
 from onboard.core.diagnosis.selection import Fit, Fitter
@@ -38,12 +39,14 @@ class Undecided:
         title: that in a short sentence.
         share: how likely it is, between 0 and 1.
         moves: (6,) by how much its scale (1) and beta (m/s^2) are larger.
+        wider: (6, 6) by how much it knows them worse, covariance; in no direction negative.
     """
 
     effect: str
     title: str
     share: float
     moves: Array
+    wider: Array
 
 
 def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
@@ -67,8 +70,7 @@ def undecided(choice: Choice, families: Sequence[Effect]) -> list[Undecided]:
         free, others = [i for i in free if i not in gone], [*others, *dropped]
     before = fitter.fit(free)
     for c, odds, after in _likely(fitter, free, before, others):
-        moves = after.theta[:6] - before.theta[:6]
-        out.append(Undecided(c.effect, _title(c), 1.0 / (1.0 + exp(-odds)), moves))
+        out.append(_instead(fitter, c, 1.0 / (1.0 + exp(-odds)), before, after))
     return out
 
 
@@ -107,23 +109,47 @@ def left_open(models: Sequence[Undecided]) -> Array:
     """(6, 6) what they add to the covariance of scale and beta."""
     out = np.zeros((6, 6))
     for model in models:
-        out += model.share * np.outer(model.moves, model.moves)
+        out += model.share * (np.outer(model.moves, model.moves) + model.wider)
     return out
 
 
 def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
-    """Models without an effect that was chosen, or with another one in its place."""
+    """Models without an effect that was chosen, or with another one in its place.
+
+    Whether it is there is what its score says; which of two it is, what each explains.
+    """
     fitter = choice.fitter
     rest = [i for i in choice.free if i not in chosen.index]
     before, with_it = fitter.fit(rest), fitter.fit(choice.free)
-    found = [(chosen, 0.0, before), *_likely(fitter, rest, before, _others(choice))]
-    own = log_odds(chosen.score(fitter, before, with_it))
+    own, most = log_odds(chosen.score(fitter, before, with_it)), beyond_need(fitter, rest, chosen)
+    found = [(chosen, 0.0, before)]
+    for c, _, fit in _likely(fitter, rest, before, _others(choice)):
+        found.append((c, own - 0.5 * (most - beyond_need(fitter, rest, c)), fit))
+    likely = shares(own, [odds for _, odds, _ in found])
     return [
-        Undecided(c.effect, _title(c), share, fit.theta[:6] - with_it.theta[:6])
-        for (c, _, fit), share in zip(
-            found, shares(own, [odds for _, odds, _ in found]), strict=True
-        )
+        _instead(fitter, c, share, with_it, fit)
+        for (c, _, fit), share in zip(found, likely, strict=True)
     ]
+
+
+def _instead(fitter: Fitter, c: Candidate, share: float, reported: Fit, other: Fit) -> Undecided:
+    """Another model than the reported one: what the six are there, and how well it knows them."""
+    moves = other.theta[:6] - reported.theta[:6]
+    here, there = (fitter.covariance(fit)[:6, :6] for fit in (reported, other))
+    return Undecided(c.effect, _title(c), share, moves, beyond(there, here))
+
+
+def beyond(larger: Array, smaller: Array) -> Array:
+    """(n, n) what one covariance has beyond another, where it has more.
+
+    In units of the smaller one, positive definite, so that scales and offsets may be compared.
+    """
+    L = np.linalg.cholesky(smaller)
+    inverse = np.linalg.inv(L)
+    size, turned = np.linalg.eigh(inverse @ (larger - smaller) @ inverse.T)
+    more = L @ turned
+    out: Array = (more * np.maximum(size, 0.0)) @ more.T
+    return out
 
 
 def shares(reported: float, others: Sequence[float]) -> list[float]:
