@@ -16,7 +16,6 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
-from onboard.core.diagnosis.forms import beyond_need, merit
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
@@ -94,7 +93,7 @@ def confounders_of(
     """
     before = fitter.fit(rest, held, held_out=False)
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
-    own = beyond_need(fitter, rest, target, held)
+    own = target.beyond_need(fitter, before, with_it)
     nearest: dict[str, Confounder] = {}
     for other in (o for o in others if o.new_beside(rest)):
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
@@ -104,7 +103,7 @@ def confounders_of(
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
         if other.score(fitter, with_it, both) >= least():
             continue
-        behind = own - beyond_need(fitter, rest, other, held)
+        behind = own - other.beyond_need(fitter, before, instead)
         if other.effect not in nearest or behind < nearest[other.effect].delta_bic:
             nearest[other.effect] = Confounder(other.effect, behind)
     return sorted(nearest.values(), key=lambda c: c.delta_bic)
@@ -134,7 +133,7 @@ def choose(
         for c in offered:
             after = wide.fit([*choice.free, *c.index])
             if accepted(wide, before, after, c):
-                better = merit(wide, choice.free, c, after)
+                better = c.merit(wide, before, after)
                 best, most = (c, better) if better > most else (best, most)
         if best is None:
             break
@@ -162,13 +161,14 @@ def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bo
     fitter = choice.fitter
     rest = [i for i in choice.free if i not in nuisances.index]
     before = fitter.fit(rest, held)
-    better = beyond_need(fitter, rest, nuisances, held)
+    with_it = fitter.fit([*rest, *nuisances.index], held, held_out=False)
+    better = nuisances.beyond_need(fitter, before, with_it)
     taken: Candidate | None = None
     for other in choice.besides(choice.chosen):
         if other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
-        its = beyond_need(fitter, rest, other, held)
+        its = other.beyond_need(fitter, before, after)
         if its > better and accepted(fitter, before, after, other):
             better, taken = its, other
     if taken is None:
@@ -255,12 +255,12 @@ def _reconsider(choice: Choice) -> None:
         if c.score(fitter, before, with_it) < least():
             choice.chosen.remove(c)
             continue
-        better, most = c, merit(fitter, rest, c, with_it) + CLEARLY
+        better, most = c, c.merit(fitter, before, with_it) + CLEARLY
         others = choice.besides([o for o in choice.chosen if o is not c])
         for other in _in_question(fitter, rest, [c, *(o for o in others if o is not c)]):
             if other is not c:
                 after = fitter.fit([*rest, *other.index])
-                its = merit(fitter, rest, other, after)
+                its = other.merit(fitter, before, after)
                 if its > most and accepted(fitter, before, after, other):
                     better, most = other, its
         choice.chosen[choice.chosen.index(c)] = better
