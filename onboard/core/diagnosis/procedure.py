@@ -273,12 +273,12 @@ def _likelier(
 
 
 def _by_jump(choice: Choice) -> float:
-    """How surprising by chance what a jump explains beside all else; minus infinity of none."""
-    fitter, scores = choice.fitter, [-inf]
+    """What a jump explains beside all else beyond its need; minus infinity of none."""
+    fitter, beyond = choice.fitter, [-inf]
     for c in (c for c in choice.chosen if c.jump):
         rest = [i for i in choice.free if i not in c.index]
-        scores.append(c.score(fitter, fitter.fit(rest), fitter.fit(choice.free)))
-    return max(scores)
+        beyond.append(c.beyond_need(fitter, fitter.fit(rest), fitter.fit(choice.free)))
+    return max(beyond)
 
 
 def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examination, Choice]:

@@ -48,7 +48,8 @@ def searched(final: Examination, families: Sequence[Effect]) -> list[Effect]:
         rest = base + made.indices_of([f for f in kept if f is not family])
         own = candidate_of(made, family)
         before = fitter.fit(rest)
-        mine = own.score(fitter, before, fitter.fit([*rest, *own.index], held_out=False))
+        with_it = fitter.fit([*rest, *own.index], held_out=False)
+        mine = own.beyond_need(fitter, before, with_it)
         best = _best(fitter, rest, offered)
         if best is not None and best[0] > mine * (1.0 + LOST) + CLEARLY:
             kept = [f for f in kept if f is not family]
@@ -64,14 +65,14 @@ def searched(final: Examination, families: Sequence[Effect]) -> list[Effect]:
 def _best(
     fitter: Fitter, rest: Sequence[int], offered: Sequence[Candidate]
 ) -> tuple[float, Effect] | None:
-    """The acceptable product with the highest score: that, and its columns."""
+    """The acceptable product that explains most beyond its need: how much, and its columns."""
     before = fitter.fit(rest)
     best: tuple[float, Effect] | None = None
     for c in offered:
         if c.columns is None or set(c.index) & set(rest):
             continue
         after = fitter.fit([*rest, *c.index])
-        score = c.score(fitter, before, after)
-        if accepted(fitter, before, after, c) and (best is None or score > best[0]):
-            best = score, c.columns
+        beyond = c.beyond_need(fitter, before, after)
+        if accepted(fitter, before, after, c) and (best is None or beyond > best[0]):
+            best = beyond, c.columns
     return best
