@@ -72,25 +72,24 @@ class Candidate:
         seen = self.witness.gain - self._unseen(fitter, after, self.witness)
         return surprise(seen + gain.weakened, unknowns, self.witness.places)
 
-    def beyond_need(self, fitter: Fitter, before: Fit, after: Fit) -> float:
-        """What it explains beyond what it would need to count as found: for rivals.
+    def common_score(self, fitter: Fitter, before: Fit, after: Fit) -> float:
+        """The score in units of one variance, that of the flight: to compare it with rivals.
 
-        A score is a probability by chance, along its own columns and with the freedom with which
-        the scatter along these is known.  That is right for whether it is there.  Of what is there
-        beyond doubt, scores differ by how well the scatter is known, and not by what the flight
-        says of the two: that is how much more one explains of it, in units of one variance.  What
-        others have seen counts with it.
+        A score is of the scatter along an effect's own columns, and of how well that is known.
+        That is right for whether it is there.  Of what is there beyond doubt, scores then differ
+        by their scatter more than by what the flight says of the two, which is how much more one
+        explains of it, and with how many unknowns.  What others have seen counts with it.
         """
-        explained = fitter.gain(before, after) / max(fitter.pool.variance, 1.0)
+        gain, k = fitter.gain(before, after) / max(fitter.pool.variance, 1.0), len(self.index)
         if self.witness is None:
-            return explained - needed(len(self.index), self.places)
-        explained += self.witness.gain - self._unseen(fitter, after, self.witness)
-        return explained - needed(len(self.index), self.witness.places)
+            return surprise(gain, k, self.places)
+        gain += self.witness.gain - self._unseen(fitter, after, self.witness)
+        return surprise(gain, k, self.witness.places)
 
     def merit(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """The same, of what cannot be by as much as it is clearly more than of what can."""
-        beyond = self.beyond_need(fitter, before, after)
-        return beyond if possible(fitter, after, self) else beyond - CLEARLY
+        score = self.common_score(fitter, before, after)
+        return score if possible(fitter, after, self) else score - CLEARLY
 
     def margin(self, fitter: Fitter, before: Fit, after: Fit) -> float:
         """By how much a jump is rather one of this accelerometer than of another one.

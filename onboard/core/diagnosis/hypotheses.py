@@ -16,6 +16,7 @@ import numpy as np
 from onboard.core.diagnosis.block_jumps import jumps_of_blocks, stepped
 from onboard.core.diagnosis.candidates import Candidate, accepted, believable, possible
 from onboard.core.diagnosis.effort import MOST_EFFECTS
+from onboard.core.diagnosis.forms import score_in_best_form
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.score import least, surprise
 from onboard.core.diagnosis.selection import Fitter
@@ -93,7 +94,7 @@ def confounders_of(
     """
     before = fitter.fit(rest, held, held_out=False)
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
-    own = target.beyond_need(fitter, before, with_it)
+    own = score_in_best_form(fitter, rest, target, held)
     nearest: dict[str, Confounder] = {}
     for other in (o for o in others if o.new_beside(rest)):
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
@@ -103,7 +104,7 @@ def confounders_of(
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
         if other.score(fitter, with_it, both) >= least():
             continue
-        behind = own - other.beyond_need(fitter, before, instead)
+        behind = own - score_in_best_form(fitter, rest, other, held)
         if other.effect not in nearest or behind < nearest[other.effect].delta_bic:
             nearest[other.effect] = Confounder(other.effect, behind)
     return sorted(nearest.values(), key=lambda c: c.delta_bic)
@@ -162,13 +163,13 @@ def reconsider_nuisance(choice: Choice, nuisances: Candidate, held: Array) -> bo
     rest = [i for i in choice.free if i not in nuisances.index]
     before = fitter.fit(rest, held)
     with_it = fitter.fit([*rest, *nuisances.index], held, held_out=False)
-    better = nuisances.beyond_need(fitter, before, with_it)
+    better = nuisances.common_score(fitter, before, with_it)
     taken: Candidate | None = None
     for other in choice.besides(choice.chosen):
         if other.effect == nuisances.effect:
             continue
         after = fitter.fit([*rest, *other.index], held)
-        its = other.beyond_need(fitter, before, after)
+        its = other.common_score(fitter, before, after)
         if its > better and accepted(fitter, before, after, other):
             better, taken = its, other
     if taken is None:

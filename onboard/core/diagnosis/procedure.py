@@ -273,12 +273,12 @@ def _likelier(
 
 
 def _by_jump(choice: Choice) -> float:
-    """What a jump explains beside all else beyond its need; minus infinity of none."""
-    fitter, beyond = choice.fitter, [-inf]
+    """How surprising by chance what a jump explains beside all else; minus infinity of none."""
+    fitter, scores = choice.fitter, [-inf]
     for c in (c for c in choice.chosen if c.jump):
         rest = [i for i in choice.free if i not in c.index]
-        beyond.append(c.beyond_need(fitter, fitter.fit(rest), fitter.fit(choice.free)))
-    return max(beyond)
+        scores.append(c.common_score(fitter, fitter.fit(rest), fitter.fit(choice.free)))
+    return max(scores)
 
 
 def _by_gps(full: Examination, asked: _Asked, choice: Choice) -> tuple[Examination, Choice]:

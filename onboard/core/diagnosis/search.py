@@ -49,7 +49,7 @@ def searched(final: Examination, families: Sequence[Effect]) -> list[Effect]:
         own = candidate_of(made, family)
         before = fitter.fit(rest)
         with_it = fitter.fit([*rest, *own.index], held_out=False)
-        mine = own.beyond_need(fitter, before, with_it)
+        mine = own.common_score(fitter, before, with_it)
         best = _best(fitter, rest, offered)
         if best is not None and best[0] > mine * (1.0 + LOST) + CLEARLY:
             kept = [f for f in kept if f is not family]
@@ -65,14 +65,14 @@ def searched(final: Examination, families: Sequence[Effect]) -> list[Effect]:
 def _best(
     fitter: Fitter, rest: Sequence[int], offered: Sequence[Candidate]
 ) -> tuple[float, Effect] | None:
-    """The acceptable product that explains most beyond its need: how much, and its columns."""
+    """The acceptable product with the highest score: that, and its columns."""
     before = fitter.fit(rest)
     best: tuple[float, Effect] | None = None
     for c in offered:
         if c.columns is None or set(c.index) & set(rest):
             continue
         after = fitter.fit([*rest, *c.index])
-        beyond = c.beyond_need(fitter, before, after)
-        if accepted(fitter, before, after, c) and (best is None or beyond > best[0]):
-            best = beyond, c.columns
+        score = c.common_score(fitter, before, after)
+        if accepted(fitter, before, after, c) and (best is None or score > best[0]):
+            best = score, c.columns
     return best

@@ -241,8 +241,8 @@ def _better(made: Examination, before: Choice, twice: Choice, jumps: Sequence[Ju
     without = fitter.fit(rest)
     was = _as_one(instead)
     with_was = fitter.fit([*rest, *(i for i in was.index if i not in rest)])
-    ours = changing.beyond_need(fitter, without, with_all)
-    return ours > CLEARLY + was.beyond_need(fitter, without, with_was)
+    ours = changing.common_score(fitter, without, with_all)
+    return ours > CLEARLY + was.common_score(fitter, without, with_was)
 
 
 def _same_as(effect: Effect, jumps: Sequence[Jump]) -> Effect:

@@ -20,6 +20,7 @@ from math import exp, log
 import numpy as np
 
 from onboard.core.diagnosis.candidates import Candidate, believable
+from onboard.core.diagnosis.forms import score_in_best_form
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.limits import CLEARLY, HARDLY, PRESENT
 from onboard.core.diagnosis.selection import Fit, Fitter
@@ -121,10 +122,10 @@ def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
     rest = [i for i in choice.free if i not in chosen.index]
     before, with_it = fitter.fit(rest), fitter.fit(choice.free)
     own = log_odds(chosen.score(fitter, before, with_it))
-    most = chosen.beyond_need(fitter, before, with_it)
+    most = score_in_best_form(fitter, rest, chosen)
     found = [(chosen, 0.0, before)]
     for c, _, fit in _likely(fitter, rest, before, _others(choice)):
-        found.append((c, own - 0.5 * (most - c.beyond_need(fitter, before, fit)), fit))
+        found.append((c, own - 0.5 * (most - score_in_best_form(fitter, rest, c)), fit))
     likely = shares(own, [odds for _, odds, _ in found])
     return [
         _instead(fitter, c, share, with_it, fit)

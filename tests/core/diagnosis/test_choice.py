@@ -279,14 +279,14 @@ def test_what_nature_does_not_allow_is_not_believed_and_has_to_be_clearly_more()
     either = replace(c, positive=False)
     assert believable(fitter, after, either)
     better = either.merit(fitter, before, after)
-    assert better == pytest.approx(either.beyond_need(fitter, before, after))
+    assert better == pytest.approx(either.common_score(fitter, before, after))
     assert c.merit(fitter, before, after) == better - CLEARLY
 
 
 def test_the_sign_that_it_may_have_costs_nothing_nor_does_one_that_is_not_sure():
     fitter, before, after, c = of_sign(1.0)
     assert believable(fitter, after, c)
-    assert c.merit(fitter, before, after) == c.beyond_need(fitter, before, after)
+    assert c.merit(fitter, before, after) == c.common_score(fitter, before, after)
     fitter, _, after, c = of_sign(-0.02)
     assert possible(fitter, after, c)
 

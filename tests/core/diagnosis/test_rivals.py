@@ -11,7 +11,6 @@ from onboard.core.diagnosis.candidates import Candidate
 from onboard.core.diagnosis.hypotheses import choose, confounders_of
 from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.procedure import examine
-from onboard.core.diagnosis.score import needed
 from onboard.core.diagnosis.undecided import beyond
 from onboard.core.physics.effects.bias_step import Witness
 from tests.core.diagnosis.problems import SIX, Columns, Problem, candidates, drawn
@@ -63,9 +62,10 @@ def test_what_others_have_seen_counts():
     before = fitter.fit(BASE, held_out=False)
     after = fitter.fit([*BASE, *three.index], held_out=False)
     witness = Witness(80.0, 50, 80.0, after.theta[three.sizes], np.ones(3))
-    more = replace(three, witness=witness).beyond_need(fitter, before, after)
-    expected = 80.0 - (needed(3, 50) - needed(3))
-    assert more - three.beyond_need(fitter, before, after) == pytest.approx(expected)
+    more = replace(three, witness=witness).common_score(fitter, before, after)
+    alone = three.common_score(fitter, before, after)
+    # Of three unknowns a tail falls a little more slowly than exp(-x / 2).
+    assert more - alone == pytest.approx(80.0 - 2.0 * np.log(50.0), abs=2.0)
 
 
 def test_what_one_covariance_has_beyond_another():
