@@ -50,8 +50,8 @@ def said(judge: Judge) -> Said:
     origin = {
         "window_squared": engine.point.window**2,
         "heading": engine.point.heading,
-        "tilt_roll": 0.0,
-        "tilt_pitch": 0.0,
+        "tilt_roll": engine.point.tilt[0],
+        "tilt_pitch": engine.point.tilt[1],
     }
     for name, at in origin.items():
         i = index.get(name)

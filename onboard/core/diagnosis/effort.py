@@ -11,9 +11,9 @@ SAMPLE_S: Final = 200.0
 """s of flight on which noise levels are tried; more does not make them better known."""
 NEIGHBOURS: Final = 4
 """Neighbouring batches of the sample: the filter needs ten seconds to settle in each."""
-WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05)
-"""Moves of delay (s), squared window (s^2), attitude delay (s) and heading (rad) that are worth
-another pass."""
+WORTH_A_PASS: Final = (2e-3, 4e-3, 0.01, 0.05, 0.05, 0.05)
+"""Moves of delay (s), squared window (s^2), attitude delay (s), heading, roll and pitch (rad) that
+are worth another pass."""
 MOST_EFFECTS: Final = 5
 """Effects beside each other: more are a search without end."""
 SEARCHED: Final = 0.1

@@ -118,9 +118,9 @@ class FinalModel:
                 )
             )
 
-        climb("six numbers only", self.held([*timing, "heading"]))
+        climb("six numbers only", self.held([*timing, *constant]))
         free = free + late
-        climb("+ timing", self.held(["heading"]))
+        climb("+ timing", self.held(constant))
         free = free + turned
         climb("+ attitude")
         for f in self.families:

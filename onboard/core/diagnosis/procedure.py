@@ -93,9 +93,9 @@ def examine(
     stands = _modelled(clear.full, asked, origin, calibrator, named_only=clear.clipped)
     if not clear.clipped:
         clear, stands = _with_given_up(clear, stands, asked, origin, calibrator)
-    # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders; and
-    # what shakes near the limit of its sensor is cut now and then, unseen: an offset that comes and
-    # goes with the manoeuvres.
+    # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
+    # What shakes near the limit of its sensor is cut now and then, unseen, which comes and goes
+    # with manoeuvres.
     if clear.fault is None and not clear.clipped:
         stands = _beside_wander(clear, stands, asked, origin, calibrator)
     return Judge(

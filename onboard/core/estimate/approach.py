@@ -21,7 +21,7 @@ from onboard.core.model.regressors import Model
 
 
 def _sigmas(found: Solution, model: Model) -> Array:
-    """(8,) standard deviations of what moves, where ``model`` is that of a solution."""
+    """(10,) standard deviations of what moves, where ``model`` is that of a solution."""
     out: Array = np.sqrt(np.diag(found.covariance))[[model.index[name] for name in MOVING]]
     return out
 

@@ -13,11 +13,12 @@ from onboard.core.estimate.limits import (
     HEADING_RANGE_RAD,
     SHAPE_RANGE,
     SHORTER,
+    TILT_RANGE_RAD,
 )
 from onboard.core.estimate.observability import Needs
 from onboard.core.inputs.limits import DELAY_RANGE_S
 from onboard.core.inputs.reach import FAR, reach_of
-from onboard.core.maths.arrays import Array, vector3, vector4
+from onboard.core.maths.arrays import Array, vector2, vector3, vector4
 from onboard.core.maths.bounded import bounded
 from onboard.core.model.ekf_sensors import EkfSensors
 from onboard.core.model.gyro_scale import GyroScale
@@ -63,7 +64,7 @@ def calibration_model(
         GyroTiming(),
         GyroScale(),
         EkfSensors(needs.prior_scale, needs.prior_offset),
-        AttitudeOffset(point.heading),
+        AttitudeOffset(point.heading, point.tilt),
         LeverArmError(),
     )
     gone = {f.instead_of for f in more}
@@ -94,6 +95,7 @@ def possible(
         (point.window**2, 0.0, reach.longest_window**2),
         (point.attitude_delay, *ATTITUDE_DELAY_RANGE_S),
         (point.heading, *HEADING_RANGE_RAD),
+        *((angle, *TILT_RANGE_RAD) for angle in point.tilt),
         *zip(
             point.shapes, *(SHAPE_RANGE if FAR.tells(apart) else 2 * (point.shapes,)), strict=True
         ),
@@ -149,6 +151,9 @@ def moved(point: Linearisation, model: Model, theta: Array) -> Linearisation:
             np.clip(point.attitude_delay + theta[i["attitude_delay"]], *ATTITUDE_DELAY_RANGE_S)
         ),
         heading=float(np.clip(point.heading + theta[i["heading"]], *HEADING_RANGE_RAD)),
+        tilt=vector2(
+            np.clip(point.tilt + theta[[i["tilt_roll"], i["tilt_pitch"]]], *TILT_RANGE_RAD)
+        ),
         antenna=vector3(theta[antenna_of(model)]),
         skew=point.skew + (float(theta[i["clock_rate"]]) if "clock_rate" in i else 0.0),
         skew_from=point.skew_from,

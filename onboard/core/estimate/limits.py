@@ -18,6 +18,8 @@ SHAPE_RANGE: Final = ((0.0, 0.0, -1.0, 0.0), (1.0, 1.0, 1.0, 1.0))
 [physics]."""
 HEADING_RANGE_RAD: Final = (-0.8, 0.8)
 """Error of the recorded heading, rad [physics: past it an EKF does not align]."""
+TILT_RANGE_RAD: Final = (-0.3, 0.3)
+"""Error of the recorded roll and pitch, rad [physics: past it a vehicle does not hover level]."""
 BEYOND: Final = 3.0
 """Sigmas outside of a range: the flight wants what nothing of it can be [probability: 0.1 % where
 it is at the very end]."""
@@ -39,9 +41,9 @@ not come to rest beside levels that stand is left where it is [cost]."""
 MOST_VAIN: Final = 5
 """Such passes after which levels are, too, that do not stand: of real flights, whose gates and
 tails go with the estimate, likelihood goes up and down by tens from pass to pass [cost]."""
-STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02)
-"""Moves of latency (s), squared window (s^2), attitude delay (s) and heading (rad) that are not
-worth another pass [cost]."""
+STEADY: Final = (5e-4, 2e-3, 5e-3, 0.02, 0.02, 0.02)
+"""Moves of latency (s), squared window (s^2), attitude delay (s), heading, roll and pitch (rad)
+that are not worth another pass [cost]."""
 NOT_WORTH: Final = 0.2
 """Sigmas of what moves that another linearisation is not worth a pass for: on real flights the
 move after it is up to half of one, so that it is a tenth of a sigma [probability]."""

@@ -67,7 +67,7 @@ def attitude_error(engine: Engine) -> tuple[Array, Array] | None:
         return None
     places = [index[n] for n in ("tilt_roll", "tilt_pitch", "heading")]
     off = solution.theta[places]
-    off[2] += engine.point.heading
+    off += (*engine.point.tilt, engine.point.heading)
     return off, np.sqrt(np.diag(solution.covariance)[places])
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from onboard.core.filter.limits import LIMITS
 from onboard.core.filter.noise import STATED, NoiseLevels
-from onboard.core.maths.arrays import Vector3, vector3, vector4
+from onboard.core.maths.arrays import Vector3, vector2, vector3, vector4
 from onboard.core.maths.blocks import Block, Seconds
 from onboard.core.maths.sums import NormalSums
 from onboard.core.model.linearisation import Linearisation
@@ -133,6 +133,7 @@ def _engine(e: dict[str, Any]) -> SavedEngine:
             window=_finite(point["window"]),
             attitude_delay=_finite(point["attitude_delay"]),
             heading=_finite(point.get("heading", 0.0)),
+            tilt=vector2(map(_finite, point.get("tilt", (0.0, 0.0)))),
             antenna=vector3(map(_finite, point.get("antenna", (0.0, 0.0, 0.0)))),
             shapes=vector4(map(_finite, point.get("shapes", (0.0, 0.0, 0.0, 0.0)))),
         ),

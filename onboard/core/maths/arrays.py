@@ -14,8 +14,20 @@ Mask: TypeAlias = NDArray[np.bool_]
 """Boolean array."""
 Vector3: TypeAlias = tuple[float, float, float]
 """Three numbers of one place or direction, in a record that never changes."""
+Vector2: TypeAlias = tuple[float, float]
+"""Two numbers of one kind, in such a record."""
 Vector4: TypeAlias = tuple[float, float, float, float]
 """Four numbers of one kind, in such a record."""
+
+
+def vector2(values: Iterable[float]) -> Vector2:
+    """Two numbers for a record.
+
+    Raises:
+        ValueError: there are more or fewer.
+    """
+    a, b = values
+    return (float(a), float(b))
 
 
 def vector3(values: Iterable[float]) -> Vector3:

@@ -11,16 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from onboard.core.inputs.segments import Segment
-from onboard.core.maths.arrays import Array, Vector4, vector3, vector4
-from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.maths.arrays import Array, Vector2, Vector4, vector2, vector3, vector4
+from onboard.core.maths.frames import rotation_from_euler, rotation_from_vector
 from onboard.core.maths.interpolation import Hermite
 
 SHAPES = ("mostly_newer", "mostly_older", "leaning", "lagging")
 """How a receiver may weigh what is in its span, beside an even mean."""
-MOVING = ("gps_delay", "window_squared", "attitude_delay", "heading", *SHAPES)
+MOVING = (
+    "gps_delay",
+    "window_squared",
+    "attitude_delay",
+    "heading",
+    "tilt_roll",
+    "tilt_pitch",
+    *SHAPES,
+)
 """Unknowns that are estimated about the linearisation, which follows them."""
 
-LINEAR = ((1e-3, 2e-3, 5e-3, 0.02), 0.01, 0.1, 0.015, 1e-5)
+LINEAR = ((1e-3, 2e-3, 5e-3, 0.02, 0.02, 0.02), 0.01, 0.1, 0.015, 1e-5)
 """Moves of the first of :data:`MOVING`, scale (1), beta (m/s^2), antenna (m) and clock (s/s) over
 which unknowns are linear well enough to find noise levels, and the point where the sums are to be
 made [cost]."""
@@ -38,6 +46,7 @@ class Linearisation:
         shapes: (4,) shares of :data:`SHAPES` in how it weighs what is in its span.
         attitude_delay: lateness of the recorded attitude, s.
         heading: how much too large the recorded yaw is, rad.
+        tilt: how much too large the recorded roll and pitch are, (2,) rad, fixed in the body.
         antenna: (3,) lever arm beyond the configured one, body axes, m, whose velocity latency and
             averaging act on; the unknown itself is linear and counted from nothing.
         skew: growth of the latency, s/s, from ``skew_from`` (s on the boot clock) on.
@@ -54,6 +63,7 @@ class Linearisation:
     skew: float = 0.0
     skew_from: float = 0.0
     shapes: Vector4 = (0.0, 0.0, 0.0, 0.0)
+    tilt: Vector2 = (0.0, 0.0)
 
     def true_time(self, stamp: Array) -> Array:
         """When what a fix with these stamps says was true, s."""
@@ -68,7 +78,8 @@ class Linearisation:
     @property
     def moving(self) -> tuple[float, ...]:
         """What has been taken in of the unknowns :data:`MOVING`."""
-        return self.delay, self.window**2, self.attitude_delay, self.heading, *self.shapes
+        timing = self.delay, self.window**2, self.attitude_delay
+        return *timing, self.heading, *self.tilt, *self.shapes
 
     def near(self, other: Linearisation, within: Sequence[float]) -> bool:
         """Whether no unknown has moved by as much as ``within``.
@@ -98,6 +109,7 @@ class Linearisation:
             antenna=vector3(each(self.antenna, other.antenna)),
             skew=between(self.skew, other.skew),
             shapes=vector4(each(self.shapes, other.shapes)),
+            tilt=vector2(each(self.tilt, other.tilt)),
         )
 
     def stands_for(self, other: Linearisation) -> bool:
@@ -118,7 +130,7 @@ class Linearisation:
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Recorded attitude (m, 3, 3) at ``t`` less its errors, and where samples vouch for it."""
         R, near = segment.attitude_at(t + self.attitude_delay, self.attitude_delay, curve)
-        return _turned(-self.heading) @ R, near
+        return _turned(-self.heading) @ R @ _tilted(self.tilt), near
 
     @property
     def six(self) -> Array:
@@ -130,3 +142,9 @@ class Linearisation:
 def _turned(heading: float) -> Array:
     """(3, 3) turn about down: all segments about one linearisation have the same."""
     return rotation_from_euler(0.0, 0.0, heading)
+
+
+@lru_cache(maxsize=4)
+def _tilted(tilt: Vector2) -> Array:
+    """(3, 3) turn that takes a tilt of the body off an attitude, likewise."""
+    return rotation_from_vector((-tilt[0], -tilt[1], 0.0))

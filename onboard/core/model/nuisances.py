@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.maths.arrays import Array, Vector4
+from onboard.core.maths.arrays import Array, Vector2, Vector4
 from onboard.core.maths.earth import STANDARD_GRAVITY
 from onboard.core.maths.frames import cross
 from onboard.core.model.around import Around
@@ -199,12 +199,16 @@ class AttitudeOffset(Family):
     name = "attitude_offset"
 
     def __init__(
-        self, heading: float = 0.0, tilt_sigma: float = 0.03, heading_sigma: float = 0.1
+        self,
+        heading: float = 0.0,
+        tilt: Vector2 = (0.0, 0.0),
+        tilt_sigma: float = 0.03,
+        heading_sigma: float = 0.1,
     ) -> None:
-        """Take the heading's error of the linearisation and the prior sigmas, rad."""
+        """Take the errors of the linearisation, of heading and (2,) tilt, and prior sigmas, rad."""
         self.unknowns = (
-            Unknown("tilt_roll", "rad", 0.0, tilt_sigma),
-            Unknown("tilt_pitch", "rad", 0.0, tilt_sigma),
+            Unknown("tilt_roll", "rad", -tilt[0], tilt_sigma),
+            Unknown("tilt_pitch", "rad", -tilt[1], tilt_sigma),
             Unknown("heading", "rad", -heading, heading_sigma),
         )
 

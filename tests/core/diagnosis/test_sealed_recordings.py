@@ -203,3 +203,17 @@ def test_averaging_that_an_antenna_could_be_instead_is_named_or_told_with_its_co
         assert abs(window.value - 0.3) < max(0.03, 3.0 * window.sigma)
     confounded = [set(a.names) for a in said.ambiguous]
     assert said.effects or any({"gps_smoothing", "gps_lever_arm"} <= c for c in confounded)
+
+
+@pytest.mark.slow
+def test_a_large_tilt_does_not_hide_what_the_heading_is_off_by():
+    # What is left of it at the second order goes with the bank, as a heading that wanders.
+    tilt, north = concealed.MountTilt(roll=-0.11, pitch=0.08), concealed.HeadingError(yaw=-0.25)
+    said, _ = diagnosed("plane", 7, tilt, north, duration=200.0)
+    found = {e.name: e.unknowns for e in said.effects}
+    assert set(found) == {"mount_tilt", "heading_error"}
+    assert found["mount_tilt"]["roll"].value == pytest.approx(tilt.roll, abs=0.006)
+    assert found["mount_tilt"]["pitch"].value == pytest.approx(tilt.pitch, abs=0.012)
+    yaw = found["heading_error"]["yaw"]
+    assert abs(yaw.value - north.yaw) < 3.0 * yaw.sigma
+    assert yaw.sigma < 0.04

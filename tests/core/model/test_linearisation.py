@@ -5,7 +5,7 @@ import pytest
 
 from onboard.core.estimate.calibration_model import calibration_model, moved
 from onboard.core.inputs.segments import Segment
-from onboard.core.maths.frames import rotation_from_euler
+from onboard.core.maths.frames import rotation_from_euler, rotation_from_vector
 from onboard.core.model.linearisation import MOVING, SHAPES, Linearisation
 from onboard.core.physics.effect import Origin
 from onboard.core.physics.effects.gps_lever_arm import GpsLeverArm
@@ -17,17 +17,26 @@ def attitude(t):
     return rotation_from_euler(0.4 * np.sin(1.1 * t), 0.3 * np.cos(0.7 * t), 0.8 * t)
 
 
-def recorded(delay, heading):
+def recorded(delay, heading, tilt):
     R = rotation_from_euler(0.0, 0.0, heading) @ attitude(T - delay)
+    R = R @ rotation_from_vector((*tilt, 0.0))
     still = np.zeros((len(T), 3))
     return Segment(T, still, still, T, R, np.eye(3))
 
 
-@pytest.mark.parametrize(("delay", "heading"), [(0.08, 0.0), (0.0, -0.3), (-0.05, 0.25)])
-def test_delay_and_heading_are_taken_out_exactly(delay, heading):
-    point = Linearisation(attitude_delay=delay, heading=heading)
+@pytest.mark.parametrize(
+    ("delay", "heading", "tilt"),
+    [
+        (0.08, 0.0, (0.0, 0.0)),
+        (0.0, -0.3, (0.0, 0.0)),
+        (0.0, 0.0, (-0.11, 0.08)),
+        (-0.05, 0.25, (0.2, 0.1)),
+    ],
+)
+def test_delay_heading_and_tilt_are_taken_out_exactly(delay, heading, tilt):
+    point = Linearisation(attitude_delay=delay, heading=heading, tilt=tilt)
     at = np.linspace(0.5, 3.5, 40)
-    R, near = point.attitude(recorded(delay, heading), at)
+    R, near = point.attitude(recorded(delay, heading, tilt), at)
     assert near.all()
     # Interpolated between samples 20 ms apart, to well below a tenth of a milliradian.
     assert np.max(np.abs(R - attitude(at))) < 1e-4
@@ -48,7 +57,8 @@ def test_a_nuisance_gives_way_to_the_effect_with_its_columns():
 def test_the_linearisation_follows_its_unknowns():
     model = calibration_model(Linearisation())
     theta = model.prior.copy()
-    asked = dict(zip(MOVING, (0.03, 0.04, 0.05, -0.2, 0.2, 0.1, -0.3, 0.4), strict=True))
+    values = (0.03, 0.04, 0.05, -0.2, 0.07, -0.05, 0.2, 0.1, -0.3, 0.4)
+    asked = dict(zip(MOVING, values, strict=True))
     for name, value in asked.items():
         theta[model.index[name]] = value
     arm = (0.04, -0.03, 0.02)

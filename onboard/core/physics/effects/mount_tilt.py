@@ -41,6 +41,7 @@ import numpy as np
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.maths.arrays import Array
 from onboard.core.maths.earth import STANDARD_GRAVITY
+from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.regressors import Unknown
 from onboard.core.physics.effect import SURE, Bearing, Cure, NuisanceFit, Origin
 from onboard.core.physics.finding import Finding, Quantity
@@ -104,7 +105,7 @@ class MountTilt(Turning):
     def measured(cls, nuisances: NuisanceFit) -> tuple[dict[str, Quantity], Cure] | None:
         """The constant error of the recorded attitude, as it is and as it is reported."""
         at = [nuisances.index[name] for name in cls.in_every_model]
-        tilt = nuisances.theta[at]
+        tilt = nuisances.point.tilt + nuisances.theta[at]
         sigma = np.hypot(nuisances.sigma[at], EKF_SIGMA_RAD)
         # As it is reported: a trim that makes it right again is its cure, whatever was meant by it.
         reported = tilt - np.array(nuisances.parameters.trim[:2])
@@ -117,6 +118,11 @@ class MountTilt(Turning):
             for key, value, s in zip(cls.keys, tilt, sigma, strict=True)
         }
         return size, attitude_cure(tilt, nuisances.theta[:6], nuisances.parameters, nuisances.imu)
+
+    @classmethod
+    def absent(cls, point: Linearisation, told: float) -> dict[str, float]:  # noqa: ARG003
+        """An attitude that fits both sensors."""
+        return {"tilt_roll": -point.tilt[0], "tilt_pitch": -point.tilt[1]}
 
     def cured(self, values: Mapping[str, float]) -> Cure:
         """To leave AHRS_TRIM alone, or to take out of it what was put there for this tilt.
