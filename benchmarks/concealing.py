@@ -7,6 +7,8 @@ found.  What a flight cannot show by nature is declared here, before any recordi
 
 * gravity beside a z offset takes steep turns for minutes: a unit is more than any place on earth;
 * curvature of the scale and a bending mount need load factors: a copter flies near one;
+* an offset along z that goes with the throttle is a scale of z to a copter, whose force along z the
+  throttle makes (five sigma are 3.5 m/s^2);
 * a multicopter's drag changes how it flies, not what its sensors read.
 
 Apart from that challenge there is one of what it has not got (:class:`Harder`): offsets that follow
@@ -71,6 +73,11 @@ class Secret:
     names: tuple[str, ...] = ()
     level: Level = "medium"
     curved: bool = False
+
+    @property
+    def described(self) -> tuple[str, ...]:
+        """Effects that no more than describe what is concealed: an offset that swings wanders."""
+        return ("offset_wander",) if self.names == ("swing",) else ()
 
     @property
     def testable(self) -> bool:

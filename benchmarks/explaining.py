@@ -71,7 +71,7 @@ class Outcome:
     @property
     def false(self) -> set[str]:
         """Names that were said of nothing; a formula without a name claims none."""
-        return set(self.found) - self.wanted - {"empirical"}
+        return set(self.found) - self.wanted - {"empirical", *self.secret.described}
 
 
 def one(secret: Secret) -> Outcome:

@@ -209,7 +209,7 @@ class ThrottleCoupling(ByAxis):
 
     name: ClassVar[str] = "throttle_coupling"
     units: ClassVar[Mapping[str, Sizes]] = {
-        "copter": {"x": 0.2, "y": 0.2, "z": 0.1},
+        "copter": {"x": 0.2, "y": 0.2},
         "plane": {"x": 0.3, "y": 0.2, "z": 0.12},
     }
     kind: ClassVar[str] = "offset with the flight"

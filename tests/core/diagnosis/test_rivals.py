@@ -13,6 +13,7 @@ from onboard.core.diagnosis.limits import CLEARLY
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.undecided import beyond
 from onboard.core.physics.effects.bias_step import Witness
+from sitl.builtin.effects import GpsFault, ThrottleCoupling
 from tests.core.diagnosis.problems import SIX, Columns, Problem, candidates, drawn
 
 BASE = range(6)
@@ -86,10 +87,12 @@ def test_what_one_covariance_has_beyond_another():
 @pytest.mark.slow
 def test_a_throttle_that_shifts_offsets_is_not_told_as_axes_that_are_not_square():
     """With three unknowns fewer it explains more; z, which a hover does not show, is left open."""
-    secret = Secret(151192, "copter", "pair", ("throttle_coupling", "gps_fault"), "large")
-    judge = examine(heard(secret.spec()), 1)
+    fault = GpsFault(start=105.0, end=129.5, north=3.33, east=2.57)
+    drawn_by = Secret(151192, "copter", "pair", ("throttle_coupling", "gps_fault"), "large").spec()
+    spec = replace(drawn_by, effects=(ThrottleCoupling(x=1.09, y=1.14, z=-0.45), fault))
+    judge = examine(heard(spec), 1)
     said = judge.diagnosis()
     assert [e.name for e in said.effects] == ["throttle_coupling", "gps_fault"]
-    true, c = secret.spec().imus[0], judge.calibration
+    true, c = spec.imus[0], judge.calibration
     off = np.subtract((*c.scale, *c.offset), (*true.scale, *true.offset))
     assert np.all(np.abs(off) < 3.0 * np.array((*c.scale_sigma, *c.offset_sigma)))
