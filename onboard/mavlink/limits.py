@@ -142,6 +142,10 @@ longer waits are for a boot that is still busy and for parameters fetched at the
 
 # The boot clock
 
+LATENESS_FORGOTTEN: Final = 0.5
+"""s for each second in which both clocks went on: a clock at two thirds of our pace, as that of a
+simulator on a busy machine, is not late.  A slower one says HEARTBEAT too seldom to be written to
+anyway (FRESH_S of a push, 1.5 s) [use]."""
 NEAR_WRAP_S: Final = 600.0
 """s; a jump back by one wrap is a wrap only this close to it, else a reboot [tuned]."""
 UNIX_FROM_US: Final = 10**15
