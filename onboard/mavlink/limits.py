@@ -174,6 +174,12 @@ RATE_WINDOW_S: Final = 4.0
 """s over which a rate is measured: four messages of the slowest [data]."""
 RATE_SHORTFALL: Final = 0.5
 """Share of what was granted; below it the rate is asked for again [tuned]."""
+RATE_FULL: Final = 0.8
+"""Share of what was granted; below it a line has no room: one that has delivers nine tenths and more
+[data]."""
+SELDOM_MS: Final = 250
+"""ms between two of each stream while parameters are written: all of them together are 1 kB/s then,
+half of what 19200 baud carry [data]."""
 AGAIN_S: Final = (1.0, 5.0, 10.0, 20.0, 40.0, 60.0)
 """s before asking again [ArduPilot: slows streams itself while parameters are fetched]."""
 

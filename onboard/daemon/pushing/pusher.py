@@ -91,6 +91,11 @@ class Pusher:
         return self._writer.busy
 
     @property
+    def writes_on_the_ground(self) -> bool:
+        """Whether a transaction is under way with a vehicle that stands."""
+        return self.busy and self._in_flight_since is None
+
+    @property
     def has_written(self) -> bool:
         """Whether a transaction was begun in this run."""
         return any(self._counts[name] for name in ("pushes", "roll_backs", "resumed"))
