@@ -175,8 +175,8 @@ RATE_WINDOW_S: Final = 4.0
 RATE_SHORTFALL: Final = 0.5
 """Share of what was granted; below it the rate is asked for again [tuned]."""
 RATE_FULL: Final = 0.8
-"""Share of what was granted; below it a line has no room: one that has delivers nine tenths and more
-[data]."""
+"""Share of what was granted; below it a line is full: one that has room delivers nine tenths and
+more [data]."""
 SELDOM_MS: Final = 250
 """ms between two of each stream while parameters are written: all of them together are 1 kB/s then,
 half of what 19200 baud carry [data]."""
