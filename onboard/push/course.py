@@ -126,7 +126,9 @@ class Course:
             case State.SETTLING | State.UNDO_SETTLING:
                 resumed = previous is State.INSPECTING and following is State.SETTLING
                 self.progress.finishing = resumed
-                self.settled_at = now + self._settings.settle_s
+                # On the way back a new value may still come, and after it an answer from before.
+                delays = 1 if following is State.SETTLING else 2
+                self.settled_at = now + delays * self._settings.settle_s
             case State.INSPECTING:
                 if previous is not State.NEW:
                     self._turn()

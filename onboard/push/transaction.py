@@ -40,7 +40,8 @@ loss of the link.  One transaction at a time: IMUs are pushed one after the othe
 **Late packets.**  A link may duplicate and delay a PARAM_SET, and the protocol has nothing
 to tell an old one from a new one.  So, after the last write, the transaction lets
 ``settle_s`` pass before it reads all six once more and believes them.  (Until then a late
-copy of a write that was rolled back can put any mixture in force for a moment.)
+copy of a write that was rolled back can put any mixture in force for a moment.)  On the way back
+it is twice that: a late copy of a new value, and then an answer that was given before it came.
 
 **Arming.**  A landed push sends a new value only within ``fresh_s`` after a HEARTBEAT that said
 disarmed, and none after one that said armed.  Three things could then be done with a set of which
