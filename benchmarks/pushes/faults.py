@@ -57,7 +57,8 @@ class Script:
 
 
 KINDS = ("arm", "arm_says_so", "cut", "silence", "reboot", "quiet_reboot", "deny", "full_disk",
-         "full_storage", "rival_sets", "rival_restores", "rival_reads", "fly")  # fmt: skip
+         "full_storage", "rival_sets", "rival_restores", "rival_reads", "fly",
+         "held_back")  # fmt: skip
 OFFSETS = (
     ((0.02, -0.03, 0.04), (0.15, -0.21, 0.08)),
     ((0.1, 0.0, 0.0), (0.0, 0.2, 0.0)),

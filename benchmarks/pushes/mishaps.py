@@ -40,6 +40,8 @@ class Mishaps:
             case "cut":
                 self._link.cut = True
                 self._agenda.at(end, lambda: setattr(self._link, "cut", False))
+            case "held_back":
+                autopilot.held_until = max(autopilot.held_until, end)
             case "silence":
                 autopilot.silent_until = end
             case "reboot" | "quiet_reboot":
@@ -73,6 +75,7 @@ class Mishaps:
         self._story.say("-- calm")
         self.disarm()
         self._link.cut = False
+        self._autopilot.held_until = self._agenda.now
         self._link.weather = Weather(0.0, 0.0, 0.0, 0.0)
         self._autopilot.denied.clear()
         self._autopilot.full = self._disk.full = False

@@ -79,6 +79,7 @@ class History:
         self._transaction: PushTransaction | None = None
         self._observed = Observed()
         self._heard: tuple[float, bool] | None = None
+        self._heard_at = 0.0
         self._armed_since: float | None = None
         self._not_before = 0.0
         self._pushed = False
@@ -141,7 +142,7 @@ class History:
         if self._journal is None:
             self._start()
             return
-        silent = self._heard is not None and now - self._heard[0] > SILENT_S
+        silent = self._heard is not None and now - self._heard_at > SILENT_S
         if silent:
             self._heard = None
             self._observed.forget()
@@ -256,13 +257,14 @@ class History:
             return
         now = self.agenda.now
         if isinstance(event, Heartbeat):
-            self._heard = (now, event.armed)
+            said = now - event.late
+            self._heard, self._heard_at = (said, event.armed), now
             if not event.armed:
                 self._armed_since = None
             elif self._armed_since is None:
-                self._armed_since = now
-            self._observed.feed(VehicleState(now, armed=event.armed), now)
-            self._observed.feed(VehicleState(now, landed=not self.autopilot.flying), now)
+                self._armed_since = said
+            self._observed.feed(VehicleState(said, armed=event.armed), said)
+            self._observed.feed(VehicleState(said, landed=not self.autopilot.flying), said)
             if self._seen_boots != self.autopilot.boots and self.rng.random() < 0.8:
                 self._guarded(lambda: self._tell(Rebooted()))
                 self._observed.forget()

@@ -4,8 +4,8 @@
    journal says which; nothing is left open.  (Where the autopilot's storage was full and somebody
    else has written a value since, nothing is promised: a person's values are not touched.)
 2. Whenever a transaction says that it completed or was rolled back, that is so.
-3. Under ``landed`` a new value leaves only within 1.5 s after a HEARTBEAT that said disarmed, and
-   none after one that said armed; an old one not later than 2 s after that.
+3. Under ``landed`` a new value leaves only within 1.5 s after a HEARTBEAT that said disarmed was
+   sent, and none after one that said armed; an old one not later than 2 s after either.
 4. Nothing is written before the plan is on the disk, and nothing but the six.
 5. Never are all three offsets zero, which ArduPilot takes for "never calibrated", where packets
    come once and in time, and nobody else writes.
@@ -47,8 +47,8 @@ class Rules:
         Args:
             output: it.
             journal: of the service.
-            heard: when the last HEARTBEAT came, s, and whether it said armed.
-            armed_since: when the first came that said so, s.
+            heard: when the last HEARTBEAT was sent, s, and whether it said armed.
+            armed_since: when the first was sent that said so, s.
             in_flight: whether the push may write to an armed vehicle.
         """
         if isinstance(output, SendParamRead):
@@ -66,14 +66,15 @@ class Rules:
             return
         if new and (heard is None or heard[1] or now - heard[0] > limits.FRESH_S + 1e-9):
             self.story.broken(f"a new value is sent, and the last HEARTBEAT was {heard}")
-        late = armed_since is not None and now - armed_since > limits.ARMED_UNDO_S
-        if not new and late:
-            self.story.broken("an old value is sent long after it armed")
+        known = heard and heard[0] if armed_since is None else armed_since
+        if not new and (known is None or now - known > limits.ARMED_UNDO_S + 1e-9):
+            self.story.broken(f"an old value is sent, armed since {armed_since}, heard {heard}")
 
     def offsets(self) -> None:
         """A value has changed in the autopilot."""
         weather, autopilot = self._script.weather, self._autopilot
-        punctual = not (weather.late or weather.duplication or autopilot.boots)
+        held = autopilot.held_until > 0.0
+        punctual = not (weather.late or weather.duplication or held or autopilot.boots)
         offsets = [autopilot.ram[name] for name in self._plan.names[3:]]
         if punctual and not autopilot.touched and not any(offsets):
             self.story.broken("all offsets are zero")

@@ -92,7 +92,8 @@ class Autopilot:
         self.full = False
         self.armed = False
         self.flying = False
-        self.silent_until = -1.0
+        self.silent_until = self.held_until = -1.0
+        """Until then it says nothing; until then nothing of what it says arrives."""
         self.boots = 0
         self.lost = False
         """Something was not stored."""
@@ -174,7 +175,12 @@ class Autopilot:
         return ValueReceived(name, value)
 
     def _say(self, event: TransactionEvent) -> None:
-        self._link.carry(event, self._hear)
+        late = self.held_until - self._agenda.now
+        if late <= 0.0:
+            self._link.carry(event, self._hear)
+            return
+        held = Heartbeat(event.armed, late) if isinstance(event, Heartbeat) else event
+        self._agenda.at(self.held_until, lambda: self._link.carry(held, self._hear))
 
 
 def _nothing() -> None:

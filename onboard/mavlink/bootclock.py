@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from onboard.core.inputs.boot_time import LONGEST_DELAY_S, began_anew
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import MESSAGE_IDS, Message
+from onboard.mavlink.lateness import Lateness
 from onboard.mavlink.otherclock import OtherClock
 
 STAMPED_MS: Final = ("SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3", "ATTITUDE")
@@ -61,6 +62,7 @@ class BootClock:
         self.unseen = False
         """Whether the last reboot was in a silence: its stamps have not gone back."""
         self.other = OtherClock()
+        self.lateness = Lateness()
         self._suspect: float | None = None
         self._heard: tuple[float, float] | None = None
         self._silence: tuple[float, float, float, float] | None = None
@@ -72,6 +74,7 @@ class BootClock:
         self.latest = self._suspect = self._unix_offset = None
         self._heard = self._silence = None
         self.other.forget()
+        self.lateness.forget()
         self._paired = False
 
     def certain(self, now: float) -> bool:
@@ -110,6 +113,7 @@ class BootClock:
         # Unix time runs on through a reboot, and is no boot time before both are known at once.
         if now is not None and self.latest is not None and stamp is not None:
             self._keep_pace(self.latest, now)
+            self.lateness.take(self.latest, now)
         return self.reboots != before
 
     def _stamp(self, message: Message) -> float | None:
@@ -159,6 +163,7 @@ class BootClock:
         self.latest = t
         self._suspect = self._silence = None
         self._unix_offset, self._paired = None, False
+        self.lateness.forget()
 
     def only_advances(self, stamps: NDArray[np.float64]) -> bool:
         """Whether boot times (n,), s, do nothing but go on, in their order of arrival.

@@ -142,6 +142,10 @@ longer waits are for a boot that is still busy and for parameters fetched at the
 
 # The boot clock
 
+LATENESS_FORGOTTEN: Final = 0.5
+"""s for each second in which both clocks went on: a clock at two thirds of our pace, as that of a
+simulator on a busy machine, is not late.  A slower one says HEARTBEAT too seldom to be written to
+anyway (FRESH_S of a push, 1.5 s) [use]."""
 NEAR_WRAP_S: Final = 600.0
 """s; a jump back by one wrap is a wrap only this close to it, else a reboot [tuned]."""
 UNIX_FROM_US: Final = 10**15
@@ -170,6 +174,12 @@ RATE_WINDOW_S: Final = 4.0
 """s over which a rate is measured: four messages of the slowest [data]."""
 RATE_SHORTFALL: Final = 0.5
 """Share of what was granted; below it the rate is asked for again [tuned]."""
+RATE_FULL: Final = 0.8
+"""Share of what was granted; below it a line is full: one that has room delivers nine tenths and
+more [data]."""
+SELDOM_MS: Final = 250
+"""ms between two of each stream while parameters are written: all of them together are 1 kB/s then,
+half of what 19200 baud carry [data]."""
 AGAIN_S: Final = (1.0, 5.0, 10.0, 20.0, 40.0, 60.0)
 """s before asking again [ArduPilot: slows streams itself while parameters are fetched]."""
 

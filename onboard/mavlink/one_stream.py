@@ -70,6 +70,14 @@ class Stream:
         """The interval in force, ms."""
         return None if self.granted is None else self.ladder[self.granted]
 
+    @property
+    def is_short(self) -> bool:
+        """Whether much less of it comes than was granted: the line is full."""
+        granted = self.granted_ms
+        if granted is None or not self.measured:
+            return False
+        return self.measured < limits.RATE_FULL * 1e3 / granted
+
     def choose(self, too_fast: int) -> int | None:
         """The rung of the ladder to ask for next, None when there is nothing left to ask.
 
@@ -110,6 +118,12 @@ class Stream:
         self.granted = rung
         self.due = None
         self.state = StreamState.GRANTED
+        self._begin_window(now)
+
+    def begin_again(self, now: float) -> None:
+        """It is to be asked for as it was granted."""
+        if self.granted is not None:
+            self.state, self.due = StreamState.WAITING, now
         self._begin_window(now)
 
     def rest(self) -> None:

@@ -5,6 +5,8 @@ not say which message it is about.  ArduPilot denies an interval that is too sho
 loop rate and an unknown message in the same words, hence the probe with a slow interval
 after a first denial, and then bisection for the fastest interval that is granted.  An
 answer is a promise only: rates are measured, and asked for again when they do not come.
+A line that is full has no room for parameters: while they are written to a vehicle that stands,
+less is asked for.
 Where the parameters say that ATTITUDE is not always of the body, ATTITUDE_QUATERNION is asked for,
 too.
 """
@@ -12,7 +14,7 @@ too.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -101,6 +103,9 @@ class Streams:
         self.legacy = False
         self.obeyed_at = -math.inf
         """When it last said yes or no to a question, s: it hears us, and is heard."""
+        self.writing: Callable[[], bool] = lambda: False
+        """Whether parameters are being written to a vehicle that stands."""
+        self._fewer: list[Stream] = []
         self._target: tuple[int, int] | None = None
         self._current: Stream | None = None
         self._rung = 0
@@ -133,6 +138,7 @@ class Streams:
         self._too_fast = 0
         self._quiet_until = now
         self._groups_asked.clear()
+        self._fewer.clear()
         for stream in self._streams.values():
             stream.restart(now)
 
@@ -172,10 +178,16 @@ class Streams:
 
     def poll(self, now: float) -> Sequence[Message]:
         """Measure; return the question that is due, if any."""
+        if self._fewer:
+            if self.writing():
+                return ()
+            self._as_before(now)
         for stream in self._streams.values():
             stream.measure(now)
         if self._target is None:
             return ()
+        if self.writing() and not self.legacy and any(s.is_short for s in self._streams.values()):
+            return self._ask_for_fewer()
         if self._current is None:
             return self._next(now) if now >= self._quiet_until else ()
         if now - self._asked_at < limits.ACK_TIMEOUT_S:
@@ -202,6 +214,23 @@ class Streams:
             )
             for stream in self._streams.values()
         )
+
+    def _ask_for_fewer(self) -> Sequence[Message]:
+        """What comes often comes seldom from here on; answers to this have no room either."""
+        self._current = None
+        self._fewer = [
+            stream
+            for stream in self._streams.values()
+            if stream.granted_ms is not None and stream.granted_ms < limits.SELDOM_MS
+        ]
+        return [self._command(s.number, 1e3 * limits.SELDOM_MS) for s in self._fewer]
+
+    def _as_before(self, now: float) -> None:
+        """Each is asked for again as it was granted."""
+        for stream in self._fewer:
+            stream.begin_again(now)
+        self._fewer.clear()
+        self._quiet_until = now + limits.ACK_TIMEOUT_S  # answers to what was asked for last
 
     def _follow_views(self, now: float) -> None:
         """Ask for the body's attitude where ATTITUDE may be another one."""
@@ -275,20 +304,24 @@ class Streams:
         stream.state = StreamState.ASKED
         self._asked_at = now
         self._takes_back = stream.unwanted  # 0: as often as by itself
-        message = mavlink.MAVLink_command_long_message(
-            *self._target,
+        interval_us = 0.0 if self._takes_back else 1e3 * stream.ladder[self._rung]
+        message = self._command(stream.number, interval_us, self._asks)
+        self._asks += 1
+        return (message,)
+
+    def _command(self, number: int, interval_us: float, repetition: int = 0) -> Message:
+        return mavlink.MAVLink_command_long_message(
+            *(self._target or (0, 0)),
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-            self._asks,
-            float(stream.number),
-            0.0 if self._takes_back else 1e3 * stream.ladder[self._rung],
+            repetition,
+            float(number),
+            interval_us,
             0.0,
             0.0,
             0.0,
             0.0,
             0.0,
         )
-        self._asks += 1
-        return (message,)
 
     def _go_legacy(self, now: float) -> None:
         self.legacy = True

@@ -81,8 +81,8 @@ class Course:
         self.state = State.NEW
         self.progress = Progress()
         self.settled_at: float | None = None
-        self.fresh_until = -math.inf
-        """Until then a new value may be sent: the vehicle has just said that it is disarmed."""
+        self.disarmed_at = -math.inf
+        """When the vehicle last said that it is disarmed, if it has not said otherwise since."""
         self.undo_until: float | None = None
         """Until then an old value may be sent, for the vehicle is armed; None: it is not."""
         self._held: dict[str, SendParamSet] = {}
@@ -126,7 +126,9 @@ class Course:
             case State.SETTLING | State.UNDO_SETTLING:
                 resumed = previous is State.INSPECTING and following is State.SETTLING
                 self.progress.finishing = resumed
-                self.settled_at = now + self._settings.settle_s
+                # On the way back a new value may still come, and after it an answer from before.
+                delays = 1 if following is State.SETTLING else 2
+                self.settled_at = now + delays * self._settings.settle_s
             case State.INSPECTING:
                 if previous is not State.NEW:
                     self._turn()
@@ -172,18 +174,38 @@ class Course:
 
     # Armed or not
 
-    def disarmed(self, now: float) -> None:
-        """The vehicle has just said so: what was held back may go."""
+    def disarmed(self, said: float, now: float) -> None:
+        """The vehicle has said so: what was held back may go, if that was just now."""
         self.undo_until = None
-        self.fresh_until = now + self._settings.fresh_s
-        self._out.extend(self._held.values())
-        self._held.clear()
+        self.disarmed_at = said
+        if now <= self._until:
+            self._out.extend(self._held.values())
+            self._held.clear()
 
-    def armed(self, now: float) -> None:
-        """It has just said that: no new value from here on, and not much time for old ones."""
-        self.fresh_until = -math.inf
+    def armed(self, said: float) -> None:
+        """It has said that: no new value from here on, and not much time for old ones.
+
+        Where nothing was heard before that for longer than a new value may wait, this need not be
+        its first word that it is armed.
+        """
         if self.undo_until is None:
-            self.undo_until = now + self._settings.armed_undo_s
+            if self.disarmed_at > -math.inf:
+                said = min(said, self.disarmed_at + self._settings.fresh_s)
+            self.undo_until = said + self._settings.armed_undo_s
+        self.disarmed_at = -math.inf
+
+    @property
+    def _until(self) -> float:
+        """Until then a value may be sent.
+
+        A new one while it is disarmed, an old one while it stands, also if it has armed at once
+        after its last word.
+        """
+        if self.forward:
+            return self.disarmed_at + self._settings.fresh_s
+        if self.undo_until is None:
+            return self.disarmed_at + self._settings.armed_undo_s
+        return self.undo_until
 
     def out_of_time(self, now: float, *, flying: bool = False) -> Heard:
         """Leave what is not undone yet to the next time on the ground, once it is too late."""
@@ -231,9 +253,9 @@ class Course:
     def send(self, output: SendAction, now: float) -> None:
         """Hand out a message that the parameter client wants sent.
 
-        A new value waits for a vehicle that has just said that it is disarmed.
+        A value waits for a vehicle that has just said that it is disarmed.
         """
-        if isinstance(output, SendParamSet) and self.forward and now > self.fresh_until:
+        if isinstance(output, SendParamSet) and now > self._until:
             self._held[output.name] = output
         else:
             self._out.append(output)

@@ -37,7 +37,8 @@ ARMED_UNDO_S: Final = 2.0
 lets motors leave the idle 2 s after arming at the earliest; in the air no step is taken."""
 SETTLE_S: Final = 2.0
 """s.  Must exceed the longest delay of a link that repeats packets, so that none of our writes is
-still on its way when all six are read and believed."""
+still on its way when all six are read and believed; twice that on the way back, where what is on
+its way differs, and answers may be as late."""
 TRANSACTION_S: Final = 60.0
 """s for the way to new values: two or three on a good link; a poor one gets its time."""
 UNDO_ROUNDS: Final = 3

@@ -63,9 +63,13 @@ class VehicleReport:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """A HEARTBEAT has come this moment; armed counts from whomever it comes."""
+    """A HEARTBEAT has come this moment; armed counts from whomever it comes.
+
+    ``late``: so much longer than usual it was on its way, s.
+    """
 
     armed: bool
+    late: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,7 +40,8 @@ loss of the link.  One transaction at a time: IMUs are pushed one after the othe
 **Late packets.**  A link may duplicate and delay a PARAM_SET, and the protocol has nothing
 to tell an old one from a new one.  So, after the last write, the transaction lets
 ``settle_s`` pass before it reads all six once more and believes them.  (Until then a late
-copy of a write that was rolled back can put any mixture in force for a moment.)
+copy of a write that was rolled back can put any mixture in force for a moment.)  On the way back
+it is twice that: a late copy of a new value, and then an answer that was given before it came.
 
 **Arming.**  A landed push sends a new value only within ``fresh_s`` after a HEARTBEAT that said
 disarmed, and none after one that said armed.  Three things could then be done with a set of which
@@ -136,7 +137,7 @@ class PushTransaction:
         self._course = Course(plan, identifier, purpose, self._settings, support)
         self._course.progress.turned = recovery is not None and recovery.undo
         if allow_armed:
-            self._course.fresh_until = math.inf
+            self._course.disarmed_at = math.inf
         self._answers = Answers(self._course, recovery)
 
     @classmethod
@@ -239,6 +240,8 @@ class PushTransaction:
             return ()
         match event:
             case ValueReceived() | ErrorReceived() | TextReceived():
+                # Not after its time because nobody has looked at the clock since.
+                self._answers.hear(course.out_of_time(now), now)
                 heard = course.client.feed(event, now)
             case JournalWritten():
                 heard = course.journalled(now)
@@ -249,8 +252,8 @@ class PushTransaction:
                 heard = course.journalled(now)
             case VehicleReport():
                 heard = self._vehicle(event, now)
-            case Heartbeat(armed):
-                heard = self._heartbeat(now, armed=armed)
+            case Heartbeat(armed, late):
+                heard = self._heartbeat(now - late, now, armed=armed)
             case Rebooted():
                 heard = course.trouble(Reason.REBOOTED, "the autopilot rebooted in the middle", now)
             case LinkLost():
@@ -261,15 +264,15 @@ class PushTransaction:
         self._answers.hear(heard, now)
         return course.flush()
 
-    def _heartbeat(self, now: float, *, armed: bool) -> Heard:
+    def _heartbeat(self, said: float, now: float, *, armed: bool) -> Heard:
         """A landed push sends new values only to a vehicle that has just said it is disarmed."""
         course = self._course
         if self._allow_armed:
             return NOTHING
         if not armed:
-            course.disarmed(now)
+            course.disarmed(said, now)
             return NOTHING
-        course.armed(now)
+        course.armed(said)
         if course.progress.finishing:
             return NOTHING  # it only reads
         return course.trouble(Reason.ARMED, "the vehicle was armed in the middle", now)
@@ -281,7 +284,7 @@ class PushTransaction:
             return NOTHING
         if not self._allow_armed:
             flying = course.out_of_time(now, flying=report.landed is False)
-            return flying or self._heartbeat(now, armed=True)
+            return flying or self._heartbeat(now, now, armed=True)
         if report.ekf_healthy is False:
             return course.trouble(Reason.EKF_UNHEALTHY, "the EKF became unhealthy", now)
         return NOTHING

@@ -36,10 +36,10 @@ def test_every_kind_of_fault_is_drawn_and_every_end_is_met(tmp_path):
 
 def test_a_broken_rule_is_told_with_its_history(tmp_path, monkeypatch):
     """A transaction that forgets to go back: the rules have teeth."""
-    monkeypatch.setattr("onboard.push.course.Course.armed", lambda self, now: None)
+    monkeypatch.setattr("onboard.push.course.Course.armed", lambda self, said: None)
     monkeypatch.setattr(
         "onboard.push.transaction.PushTransaction._heartbeat",
-        lambda self, now, armed: self._course.disarmed(now) or (),
+        lambda self, said, now, armed: self._course.disarmed(said, now) or (),
     )
 
     def play_many():

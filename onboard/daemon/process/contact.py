@@ -85,9 +85,15 @@ class Contact:
                 logger.debug("%s: %s%s", endpoint, state.value, f" ({reason})" if reason else "")
         self._parts.pusher.on_event(now, event)
 
-    def heartbeat(self, now: float, *, armed: bool) -> None:
-        """Take the vehicle's HEARTBEAT: one that contradicts those before it stops a push."""
-        if self._parts.observed.heartbeat(now, armed=armed):
+    def heartbeat(self, now: float, said: float, *, armed: bool) -> None:
+        """Take the vehicle's HEARTBEAT: one that contradicts those before it stops a push.
+
+        Args:
+            now: s.
+            said: when it was sent, as far as that is known, s.
+            armed: what it says.
+        """
+        if self._parts.observed.heartbeat(said, armed=armed):
             self._life.counters["heartbeats_contradict"] += 1
             self._parts.pusher.stop("heartbeats say armed and disarmed at the same time", now)
 

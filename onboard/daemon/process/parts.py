@@ -95,7 +95,9 @@ class Parts:
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, calendar)
         streams = Streams(settings.stream_requests(configuration.link.rates))
+        streams.writing = lambda: pusher.writes_on_the_ground
         hindrance = Hindrance(link, parameters, streams, traffic, has_key=signing is not None)
+        pusher.late = lambda: link.boot_clock.lateness.seconds
         link.presence.held = lambda: pusher.busy
         link.presence.committed = lambda: pusher.has_written or handover.has_learned
         return cls(

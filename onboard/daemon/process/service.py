@@ -270,11 +270,12 @@ class Service:
             return
         self.parts.traffic.count(message.get_type())
         self.parts.calendar.feed(message)
+        said = now - self.link.boot_clock.lateness.seconds
         if is_autopilot(message):
-            self.contact.heartbeat(now, armed=is_armed(message))
+            self.contact.heartbeat(now, said, armed=is_armed(message))
         observe = self.parts.observed.feed
         for sample in self.handover.take(message):
-            observe(sample, now)
+            observe(sample, said)
 
     def _board_that_is_there(self) -> str | None:
         """Its unique id, empty if it tells none; None while what was learned may be another's."""

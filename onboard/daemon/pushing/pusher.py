@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import uuid
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import msgspec
 
@@ -66,6 +66,8 @@ class Pusher:
         self, ledger: Ledger, proposals: Proposals, witness: Witness, notices: Notices
     ) -> None:
         self.last_outcome: Outcome | None = None
+        self.late: Callable[[], float] = lambda: 0.0
+        """By how much what the autopilot says is behind, s."""
         self._counts: Counter[str] = Counter()
         self._ledger = ledger
         self._proposals = proposals
@@ -87,6 +89,11 @@ class Pusher:
     def busy(self) -> bool:
         """Whether a transaction is under way."""
         return self._writer.busy
+
+    @property
+    def writes_on_the_ground(self) -> bool:
+        """Whether a transaction is under way with a vehicle that stands."""
+        return self.busy and self._in_flight_since is None
 
     @property
     def has_written(self) -> bool:
@@ -116,7 +123,7 @@ class Pusher:
         if is_autopilot(message):
             source = (message.get_srcSystem(), message.get_srcComponent())
             if source == self._writer.target:
-                self._heard_armed(is_armed(message), now)
+                self._heard_armed(is_armed(message), now, self.late())
         self._ended(self._writer.hear(message, now), now)
         return self._writer.take_outbox()
 
@@ -136,7 +143,7 @@ class Pusher:
                 self._duties.aftercare.silent()
                 self._ended(self._writer.tell(LinkLost(), now), now)
             case RivalHeard(armed=True):
-                self._heard_armed(True, now)  # noqa: FBT003 - of whomever: it may be the real one
+                self._heard_armed(True, now, 0.0)  # noqa: FBT003 - of whomever: it may be the real one
             case TwinHeard(earlier=True):
                 text = "another service that was there first writes to this vehicle"
                 self._ended(self._writer.tell(Cancelled(text), now), now)
@@ -275,8 +282,8 @@ class Pusher:
         self.stop(sentence, now)
         return True
 
-    def _heard_armed(self, armed: bool, now: float) -> None:  # noqa: FBT001 - what was heard
-        self._ended(self._writer.tell(Heartbeat(armed), now), now)
+    def _heard_armed(self, armed: bool, now: float, late: float) -> None:  # noqa: FBT001 - what was heard
+        self._ended(self._writer.tell(Heartbeat(armed, late), now), now)
 
     def _read_ledger(self) -> None:
         self._duties.read(busy=self.busy, in_flight_since=self._in_flight_since)
