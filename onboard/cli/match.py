@@ -182,16 +182,17 @@ def flown_again_table(verified: FlownAgain) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    said = "flies like the recording" if verified.agrees else "does not fly like the recording yet"
-    table.add_row("Verified", f"the {verified.simulator} simulator {said}")
+    table.add_row("Verified", verified.sentence)
     for key, m in verified.mismatch.items():
         unit = "deg" if key == "tilt" else "m/s^2"
         said = f"{key}: {m.before:.3f} -> {m.after:.3f} {unit} RMS from the recording"
         table.add_row("", f"{said}, nominal and with what was found")
     for key, n in verified.numbers.items():
         same = "" if n.agrees else "  differs"
-        again = f"{number(n.real, n.sigma)} recorded, {number(n.again, n.sigma)} flown again"
-        table.add_row("", f"{key}: {again}{same}")
+        again = f"{number(n.again, n.sigma)} flown again"
+        if not math.isfinite(n.again):
+            again, same = "not told by the simulator's flight", ""
+        table.add_row("", f"{key}: {number(n.real, n.sigma)} recorded, {again}{same}")
     if verified.left:
         table.add_row("", f"still against the frame: {', '.join(verified.left)}")
     return table

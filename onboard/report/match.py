@@ -234,6 +234,7 @@ def _verified(v: FlownAgain) -> dict[str, Any]:
     return {
         "simulator": v.simulator,
         "agrees": v.agrees,
+        "untold": v.untold,
         "bars": rows,
         "numbers": [
             {
