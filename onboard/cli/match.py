@@ -169,7 +169,9 @@ def summary(result: Match) -> Iterator[RenderableType]:
     names = [result.real.name]
     if result.simulation is not None:
         names.insert(0, result.simulation.name)
-    yield Text(f"{' against '.join(names)}: {vehicle.vehicle}, {vehicle.seconds:.0f} s in the air")
+    # Of a flight that nothing is told of nobody has counted the seconds.
+    flown = f", {vehicle.seconds:.0f} s in the air" if vehicle.series is not None else ""
+    yield Text(f"{' against '.join(names)}: {vehicle.vehicle}{flown}")
     yield Text(f"{headline(result)}.", style=f"bold {COLOURS[result.verdict]}")
     yield from (Text(f"damage: {note}", "yellow") for note in result.damage)
     if result.effects:

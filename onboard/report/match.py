@@ -68,7 +68,7 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         damage=match.damage,
         against=_against(match),
         vehicle=v.vehicle,
-        seconds=words.fixed(v.seconds, 0),
+        seconds="" if v.series is None else words.fixed(v.seconds, 0),
         verdict=match.verdict.value,
         severity=story.SEVERITIES[match.verdict],
         headline=headline(match),
