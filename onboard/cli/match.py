@@ -24,6 +24,7 @@ from onboard.answers.match_words import (
     headline,
     number,
     proof,
+    proof_unit,
     wind_sentence,
 )
 from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
@@ -238,7 +239,8 @@ def _facts(result: Match) -> Table:
         said = f"{vehicle.alone_before:.2f} -> {vehicle.alone_after:.2f} m/s"
         table.add_row("Alone", f"velocity off by {said} after 10 s of the model alone")
     for k, d in enumerate(d for d in result.effects if proof(d) and d.level == "vehicle"):
-        table.add_row("" if k else "Proof", f"{d.name}: {proof(d)} m/s^2 without and with it")
+        said = f"{d.name}: {proof(d)} {proof_unit(d)} without and with it"
+        table.add_row("" if k else "Proof", said)
     for k, a in enumerate(vehicle.ambiguous):
         said = f"{' and '.join(a.names)}. To tell: {a.tell_apart}."
         table.add_row("" if k else "Not told apart", said)
