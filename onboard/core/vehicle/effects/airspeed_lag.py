@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from onboard.core.maths.arrays import Array
-from onboard.core.maths.earth import STANDARD_GRAVITY
-from onboard.core.vehicle.air import Air
+from onboard.core.vehicle.air import Air, speed_of
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY
 from onboard.core.vehicle.effects.airspeed_scale import COLUMN
 from onboard.core.vehicle.effects.effect import ByStep, Unknown
@@ -21,8 +20,8 @@ VFR_HUD of ArduPilot's simulator, nothing in its logs [data sheet]."""
 class AirspeedLag(ByStep):
     """The reading less its slope times the lag; beside the effects, after the scale.
 
-    Left to gusts it would be some, wherever a plane gains and loses speed.  The slope is what the
-    accelerometer feels along the flow, with gravity: gusts are not in it, for which nobody knows.
+    Left to gusts it would be some, wherever a plane gains and loses speed.  The slope is that of
+    the speed through steady air: gusts are not in it, for which nobody knows.
     """
 
     def __init__(self) -> None:
@@ -36,9 +35,17 @@ class AirspeedLag(ByStep):
 
 
 def gained(air: Air) -> Array:
-    """(n,) speed through steady air that is gained in a second, m/s^2."""
-    flight = air.flight
-    moved = flight.f_b + STANDARD_GRAVITY * flight.R_bn[:, :, 2]
-    speed = np.maximum(np.linalg.norm(air.u_b, axis=1), 1.0)
-    out: Array = np.einsum("ni,ni->n", air.u_b, moved) / speed
-    return out
+    """(n,) speed through steady air that is gained in a second, m/s^2: of steps that are in a row.
+
+    From the step before to the one behind; of what stands alone nobody knows.
+    """
+    flight, speed = air.flight, air.by_flow(speed_of)
+    row = np.abs(np.diff(flight.t) - flight.step_s) < 0.5 * flight.step_s
+    row &= (np.diff(flight.piece) == 0) & (np.diff(flight.part) == 0)
+    slope = np.where(row, np.diff(speed), 0.0) / flight.step_s
+    sides = np.zeros((2, len(speed)))
+    sides[0, 1:], sides[1, :-1] = row, row
+    out: Array = np.zeros(len(speed))
+    out[1:] += slope
+    out[:-1] += slope
+    return out / np.maximum(np.sum(sides, axis=0), 1.0)
