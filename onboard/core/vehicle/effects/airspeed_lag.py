@@ -43,9 +43,10 @@ def gained(air: Air) -> Array:
     row = np.abs(np.diff(flight.t) - flight.step_s) < 0.5 * flight.step_s
     row &= (np.diff(flight.piece) == 0) & (np.diff(flight.part) == 0)
     slope = np.where(row, np.diff(speed), 0.0) / flight.step_s
-    sides = np.zeros((2, len(speed)))
-    sides[0, 1:], sides[1, :-1] = row, row
     out: Array = np.zeros(len(speed))
-    out[1:] += slope
-    out[:-1] += slope
-    return out / np.maximum(np.sum(sides, axis=0), 1.0)
+    sides = np.zeros(len(speed))
+    for side in (slice(1, None), slice(None, -1)):
+        out[side] += slope
+        sides[side] += row
+    out /= np.maximum(sides, 1.0)
+    return out
