@@ -51,6 +51,8 @@ from onboard.recordings.recording import Recording
 FASTEST_HZ: Final = 100.0
 """Inertial samples beyond this rate are averaged: rotors follow a command within hundredths of a
 second and a vehicle more slowly, so that what is faster is vibration [physics]."""
+HIT_THE_GROUND: Final = ("copter", "plane")
+"""Kinds of vehicles whose bounces are told from flight."""
 
 S = TypeVar("S", Outputs, Battery, AirData)
 
@@ -153,7 +155,7 @@ class Flown:
                     wings=kind == "plane",
                 )
             self.ground = float(np.percentile(lasting_height(t, height), 0.5))
-            if self.grounded and self.kind == "copter":
+            if self.grounded and self.kind in HIT_THE_GROUND:
                 self.grounded = joined([*self.grounded, *self._touched(t, v, height)])
         step = _averaged_over(self._kept)
         for sample in with_landings(_slower(self._kept, step), self.grounded):

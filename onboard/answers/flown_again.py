@@ -48,7 +48,10 @@ Part: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Twice:
-    """One unknown as the recording has it, and as the flight of the simulator has it."""
+    """One unknown as the recording has it, and as the flight of the simulator has it.
+
+    ``again`` is NaN where that flight does not tell it.
+    """
 
     real: float
     again: float
@@ -69,17 +72,27 @@ class FlownAgain:
         left: effects of the airframe that the second flight has and the first had not, or not
             of this size.
         simulator: which one flew.
+        untold: why the second flight tells nothing; empty where it does.
     """
 
     numbers: Mapping[str, Twice]
     mismatch: Mapping[str, AxisMismatch]
     left: tuple[str, ...]
     simulator: str = BUILT_IN
+    untold: str = ""
 
     @property
     def agrees(self) -> bool:
-        """Whether the simulator flies like the recording."""
-        return all(n.agrees for n in self.numbers.values())
+        """Whether the simulator flies like the recording: it says so, and of every number."""
+        return not self.untold and all(n.agrees for n in self.numbers.values())
+
+    @property
+    def sentence(self) -> str:
+        """That for people, without its full stop."""
+        if self.untold:
+            return f"the {self.simulator} simulator could not fly it as it was: {self.untold}"
+        said = "flies like the recording" if self.agrees else "does not fly like the recording yet"
+        return f"the {self.simulator} simulator {said}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,17 +155,24 @@ def flown_again(
         {key: AxisMismatch(before[key], after[key]) for key in before},
         tuple(d.name for d in second.vehicle.effects if d.name not in same),
         simulator,
+        second.vehicle.note if second.vehicle.series is None else "",
     )
 
 
 def numbers_twice(first: Match, second: Match) -> dict[str, Twice]:
-    """Numbers of the effects that were found, as they are told, from both flights."""
+    """Numbers of the effects that were found, as they are told, from both flights.
+
+    What the second does not tell is not found again.
+    """
     out: dict[str, Twice] = {}
     for effect in first.vehicle.effects:
         for name in effect.values:
             key = f"{effect.name}.{name}"
             value, other = first.vehicle.numbers.get(key), second.vehicle.numbers.get(key)
-            if value is None or other is None:
+            if value is None:
+                continue
+            if other is None:
+                out[key] = Twice(value.real, math.nan, value.sigma, value.unit, agrees=False)
                 continue
             if effect.name == "thrust_scale" and first.vehicle.vehicle == "copter":
                 # Of the frame that was handed back, which has the first flight's thrust.

@@ -96,7 +96,7 @@ class VerifiedDocument(msgspec.Struct, frozen=True, kw_only=True):
     """``--verify``: the simulator flew the recording again, nominally and with what was found.
 
     ``mismatch`` is between the recording and those two flights: ``x``, ``y``, ``z`` of the force,
-    m/s^2, and ``tilt``, degrees.
+    m/s^2, and ``tilt``, degrees.  ``untold`` is why the second flight tells nothing.
     """
 
     simulator: str
@@ -104,6 +104,7 @@ class VerifiedDocument(msgspec.Struct, frozen=True, kw_only=True):
     numbers: dict[str, TwiceDocument]
     mismatch: dict[str, HeldOutDocument]
     effects_left: list[str]
+    untold: str = ""
 
 
 class MatchDocument(msgspec.Struct, frozen=True, kw_only=True):
@@ -178,6 +179,7 @@ def _verified(v: FlownAgain) -> VerifiedDocument:
         },
         mismatch=_mismatch(v.mismatch),
         effects_left=list(v.left),
+        untold=v.untold,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from onboard.answers.flown import FlownRecording
 from onboard.answers.sensor_level import DRIVER_LAG_S, calibration_settings
@@ -13,6 +14,9 @@ from onboard.core.vehicle.effects.wind_profile import TOP_M
 from onboard.core.vehicle.limits import APART
 from onboard.core.vehicle.records import Difference, VehicleMatch
 from onboard.core.vehicle.signals import airspeed_ratio
+
+ANYWHERE_DEG: Final = 360.0 / math.sqrt(12.0)
+"""Sigma of a direction of which nothing is known: a calm has none [probability]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,10 +92,9 @@ def _wind_settings(vehicle: VehicleMatch) -> list[Setting]:
         power = 0.5 if kind == 0.0 else 1.0
         gain = (TOP_M / min(max(wind.height, 0.5), TOP_M)) ** power
         speed, sigma = speed * gain, sigma * gain
-    out = [
-        Setting("SIM_WIND_DIR", direction, turn, "wind, where it comes from"),
-        Setting("SIM_WIND_T", kind, 0.0, "wind_profile" if kind != 1.0 else "wind, uniform"),
-    ]
+    out = [Setting("SIM_WIND_T", kind, 0.0, "wind_profile" if kind != 1.0 else "wind, uniform")]
+    if turn < ANYWHERE_DEG:
+        out.insert(0, Setting("SIM_WIND_DIR", direction, turn, "wind, where it comes from"))
     rising = vehicle.numbers.get(RISING)
     if rising is not None and abs(rising.real) > rising.floor + APART * rising.sigma:
         # The simulator turns the wind upwards: its speed is that along the slope.

@@ -77,14 +77,29 @@ def _alone(d: Difference) -> str:
             return say(d.values)
         except KeyError:  # an effect with other numbers than these
             pass
+    if d.name == "gps_latency" and set(d.values) == {"delay"}:
+        return _latency(d.values["delay"])
+    none = not any(v.simulation for v in d.values.values())
     sizes = [
-        f"{key.replace('_', ' ')} {whole(v.real, v.sigma, v.unit)} (simulation "
-        f"{whole(v.simulation, math.nan, v.unit)})"
+        f"{key.replace('_', ' ')} {whole(v.real, v.sigma, v.unit)}"
+        + ("" if none else f" (simulation {whole(v.simulation, math.nan, v.unit)})")
         for key, v in d.values.items()
     ]
     known = kind_of(d.name) is not None
     title = title_of(d.name) if known else capital(d.name.replace("_", " "))
-    return f"{title}: {listed(sizes)}." if sizes else f"{title}."
+    if not sizes:
+        return f"{title}."
+    return f"{title}: {listed(sizes)}{'; nothing of it in the simulation' if none else ''}."
+
+
+def _latency(delay: Compared) -> str:
+    """A receiver may be later than the simulation's, less late, or ahead of its stamps."""
+    theirs = f"the simulation's is {number(1e3 * delay.simulation)} ms late"
+    size = whole(1e3 * abs(delay.real), 1e3 * delay.sigma, "ms")
+    if delay.real < 0.0:
+        return f"GPS is {size} ahead of its stamps; {theirs}."
+    less = "" if delay.real > delay.simulation else "only "
+    return f"GPS is {less}{size} late; {theirs}."
 
 
 def _times(value: Compared) -> str:

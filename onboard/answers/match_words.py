@@ -6,6 +6,7 @@ import math
 
 from onboard.answers.match import Match
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.vehicle.effects.airspeed_scale import AirspeedScale
 from onboard.core.vehicle.effects.wind import FLOOR_M_S
 from onboard.core.vehicle.records import Compared, Difference, WindEstimate
 
@@ -94,6 +95,11 @@ def proof(d: Difference) -> str:
     if not (math.isfinite(d.held_out_before) and math.isfinite(d.held_out_after)):
         return ""
     return f"{d.held_out_before:.3f} -> {d.held_out_after:.3f}"
+
+
+def proof_unit(d: Difference) -> str:
+    """Of an effect of the vehicle: along the axes that show it, which may be the airspeed's."""
+    return "m/s" if d.name == AirspeedScale.name else "m/s^2"
 
 
 def wind_sentence(match: Match) -> str:

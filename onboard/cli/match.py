@@ -24,6 +24,7 @@ from onboard.answers.match_words import (
     headline,
     number,
     proof,
+    proof_unit,
     wind_sentence,
 )
 from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
@@ -169,7 +170,9 @@ def summary(result: Match) -> Iterator[RenderableType]:
     names = [result.real.name]
     if result.simulation is not None:
         names.insert(0, result.simulation.name)
-    yield Text(f"{' against '.join(names)}: {vehicle.vehicle}, {vehicle.seconds:.0f} s in the air")
+    # Of a flight that nothing is told of nobody has counted the seconds.
+    flown = f", {vehicle.seconds:.0f} s in the air" if vehicle.series is not None else ""
+    yield Text(f"{' against '.join(names)}: {vehicle.vehicle}{flown}")
     yield Text(f"{headline(result)}.", style=f"bold {COLOURS[result.verdict]}")
     yield from (Text(f"damage: {note}", "yellow") for note in result.damage)
     if result.effects:
@@ -182,16 +185,17 @@ def flown_again_table(verified: FlownAgain) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    said = "flies like the recording" if verified.agrees else "does not fly like the recording yet"
-    table.add_row("Verified", f"the {verified.simulator} simulator {said}")
+    table.add_row("Verified", verified.sentence)
     for key, m in verified.mismatch.items():
         unit = "deg" if key == "tilt" else "m/s^2"
         said = f"{key}: {m.before:.3f} -> {m.after:.3f} {unit} RMS from the recording"
         table.add_row("", f"{said}, nominal and with what was found")
     for key, n in verified.numbers.items():
         same = "" if n.agrees else "  differs"
-        again = f"{number(n.real, n.sigma)} recorded, {number(n.again, n.sigma)} flown again"
-        table.add_row("", f"{key}: {again}{same}")
+        again = f"{number(n.again, n.sigma)} flown again"
+        if not math.isfinite(n.again):
+            again, same = "not told by the simulator's flight", ""
+        table.add_row("", f"{key}: {number(n.real, n.sigma)} recorded, {again}{same}")
     if verified.left:
         table.add_row("", f"still against the frame: {', '.join(verified.left)}")
     return table
@@ -235,7 +239,8 @@ def _facts(result: Match) -> Table:
         said = f"{vehicle.alone_before:.2f} -> {vehicle.alone_after:.2f} m/s"
         table.add_row("Alone", f"velocity off by {said} after 10 s of the model alone")
     for k, d in enumerate(d for d in result.effects if proof(d) and d.level == "vehicle"):
-        table.add_row("" if k else "Proof", f"{d.name}: {proof(d)} m/s^2 without and with it")
+        said = f"{d.name}: {proof(d)} {proof_unit(d)} without and with it"
+        table.add_row("" if k else "Proof", said)
     for k, a in enumerate(vehicle.ambiguous):
         said = f"{' and '.join(a.names)}. To tell: {a.tell_apart}."
         table.add_row("" if k else "Not told apart", said)

@@ -13,6 +13,7 @@ from onboard.answers.match import Match
 from onboard.answers.match import match as match_recordings
 from onboard.core.vehicle.atmosphere import SEA_LEVEL_DENSITY, density
 from onboard.core.vehicle.lift_rotors import turning
+from onboard.core.vehicle.records import VehicleMatch
 from onboard.core.vehicle.signals import airspeed_ratio
 from onboard.errors import RecordingError, UsageError
 
@@ -151,6 +152,7 @@ def craft_of(result: Match) -> Airframe | Wing:
         if "thrust_scale" in names:
             ratio = next(d for d in v.effects if d.name == "thrust_scale").values["ratio"].real
             keys["hover_throttle"] = Wing().hover_throttle / ratio
+        keys["c_n_deltar"] = turning_rudder(result.vehicle)
         values = result.real.signals.parameters
         own = airspeed_ratio(values)
         ratios = [s.value for s in result.settings if s.name == f"SIM_{own}"]
@@ -167,6 +169,21 @@ def craft_of(result: Match) -> Airframe | Wing:
         if effect in names and unknown in v.numbers:
             keys[key] = max(v.numbers[unknown].real, 0.0)
     return Airframe.from_dict(keys)
+
+
+def turning_rudder(vehicle: VehicleMatch) -> float:
+    """Yawing moment of the rudder that goes with its side force, for the built-in simulator.
+
+    The force attacks at the tail, so that one turns as much more as it pushes more.  A force tells
+    no moment, and one that pushes less has turned the plane all the same as it was flown.
+    """
+    from sitl.builtin.airframe.wing import Wing
+
+    usual = Wing()
+    if "side_force" not in {d.name for d in vehicle.effects}:
+        return usual.c_n_deltar
+    force = vehicle.numbers["side_force.c_y_deltar"].real
+    return usual.c_n_deltar * max(1.0, force / usual.c_y_deltar)
 
 
 def as_sitl(wing: Wing, altitude: float) -> Wing:

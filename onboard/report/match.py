@@ -13,7 +13,7 @@ from onboard.answers import match_story as story
 from onboard.answers import words
 from onboard.answers.flown_again import FlownAgain
 from onboard.answers.match import Match
-from onboard.answers.match_words import TITLES, headline, title, wind_sentence
+from onboard.answers.match_words import TITLES, headline, proof_unit, title, wind_sentence
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.vehicle.records import Compared, Curve, Difference, VehicleMatch
 from onboard.report import match_charts
@@ -68,7 +68,7 @@ def match_html(match: Match, verified: FlownAgain | None = None, base: str = PAG
         damage=match.damage,
         against=_against(match),
         vehicle=v.vehicle,
-        seconds=words.fixed(v.seconds, 0),
+        seconds="" if v.series is None else words.fixed(v.seconds, 0),
         verdict=match.verdict.value,
         severity=story.SEVERITIES[match.verdict],
         headline=headline(match),
@@ -149,7 +149,7 @@ def _hand_back(match: Match, frame_by: str) -> str | Markup:
 
 def _card(d: Difference, v: VehicleMatch) -> dict[str, Any]:
     known = math.isfinite(d.held_out_before) and math.isfinite(d.held_out_after)
-    unit = "m/s²" if d.level == "vehicle" else "× noise"
+    unit = words.unit_in_words(proof_unit(d)) if d.level == "vehicle" else "× noise"
     return {
         "title": words.capital(title(d.name)),
         "name": d.name,
@@ -234,6 +234,7 @@ def _verified(v: FlownAgain) -> dict[str, Any]:
     return {
         "simulator": v.simulator,
         "agrees": v.agrees,
+        "untold": v.untold,
         "bars": rows,
         "numbers": [
             {

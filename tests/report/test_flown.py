@@ -146,6 +146,39 @@ def test_a_descent_that_touches_nothing_is_flight(but):
     assert not standing(found(bounced(**but)), 60.0)
 
 
+def skipped(*, shaken=6.0, lowest=0.0):
+    """A plane that hops over a field on its wheels at 20 m/s from 60 to 90 s, and goes up again."""
+    rng = np.random.default_rng(6)
+    t = np.arange(0.0, 140.0, 0.1)
+    heights = [0.0, 40.0, lowest, lowest, 40.0, 0.0]
+    hops = (t >= 60.0) & (t < 90.0)
+    up = np.interp(t, [10.0, 40.0, 60.0, 90.0, 110.0, 130.0], heights)
+    up = up + 0.4 * hops * np.abs(np.sin(1.5 * t))
+    hits = shaken * (hops & (np.diff(np.sin(1.5 * t) > 0.0, prepend=False)))
+    speed = np.interp(t, [5.0, 10.0, 130.0, 135.0], [0.0, 20.0, 20.0, 0.0])
+    sinking = -np.gradient(up, 0.1)
+    out = [VehicleState(0.0, kind="plane")]
+    for k, at in enumerate(t.tolist()):
+        f_b = 0.1 * rng.standard_normal(3) + (0.0, hits[k], -9.81)
+        out.append(ImuSample(at, 1, tuple(f_b), (0.0, 0.0, 0.0)))
+        out.append(AttitudeSample(at, 0.0, 0.0, 0.0))
+        out.append(GpsFix(at, 1, 3, 0.5, 0.5, 100.0 + up[k], speed[k], 0.0, sinking[k]))
+    return out
+
+
+def test_wheels_that_hop_over_a_field_carry_no_wing():
+    """What they push with would be a side force of the airframe, and lift."""
+    made = found(skipped())
+    assert all(standing(made, t) for t in np.arange(61.0, 89.0, 0.5))
+    assert not any(standing(made, t) for t in np.r_[20.0:54.0, 96.0:124.0])
+
+
+@pytest.mark.parametrize("but", [{"shaken": 0.0}, {"lowest": 8.0}])
+def test_a_plane_that_flies_low_and_touches_nothing_flies(but):
+    made = found(skipped(**but))
+    assert not any(standing(made, t) for t in np.arange(61.0, 89.0, 0.5))
+
+
 def plane_flight():
     """A plane that stands, flies a minute and stands again; its receiver tells no climb."""
     out = [VehicleState(0.0, kind="plane")]

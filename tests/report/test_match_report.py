@@ -169,7 +169,31 @@ def test_sentences_say_what_a_pilot_asks():
     dropped = Difference("mass_change", "vehicle", values)
     assert "12.3 ± 0.2 % less from 97.5 ± 0.1 s on" in story.sentence(dropped)
     late = Difference("gps_latency", "sensor", {"delay": Compared(0.1, 0.22, 0.004, "s")})
-    assert "0.220 ± 0.004 s (simulation 0.100 s)" in story.sentence(late)
+    assert story.sentence(late) == "GPS is 220 ± 4 ms late; the simulation's is 100 ms late."
+
+
+@pytest.mark.parametrize(
+    ("delay", "said"),
+    [
+        (-0.0176, "GPS is 17.6 ± 0.6 ms ahead of its stamps; the simulation's is 100 ms late."),
+        (0.03, "GPS is only 30.0 ± 0.6 ms late; the simulation's is 100 ms late."),
+    ],
+)
+def test_a_receiver_that_is_less_late_than_the_simulations_is_not_said_to_be_late(delay, said):
+    value = Compared(0.1, delay, 0.0006, "s")
+    assert story.sentence(Difference("gps_latency", "sensor", {"delay": value})) == said
+
+
+def test_what_the_simulation_has_nothing_of_is_said_once_and_not_by_number():
+    values = {"time": Compared(0.0, 213.0, 13.0, "s"), "z": Compared(0.0, 0.071, 0.007, "m/s^2")}
+    said = story.sentence(Difference("bias_step", "sensor", values))
+    assert said.endswith("z 0.071 ± 0.007 m/s²; nothing of it in the simulation.")
+    assert "(simulation" not in said
+
+
+def test_a_flight_that_nothing_is_told_of_has_no_seconds():
+    assert "100 s in the air" in page(seconds=100.0).words
+    assert "s in the air" not in page(series=None, seconds=0.0).words
 
 
 def test_what_a_flight_does_not_tell_apart_is_said_in_headline_and_sentence():

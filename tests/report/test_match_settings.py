@@ -46,6 +46,18 @@ def test_a_wind_errs_along_itself_in_speed_and_across_in_direction():
         assert told["SIM_WIND_DIR"].sigma == pytest.approx(turns.std(), rel=0.02)
 
 
+@pytest.mark.parametrize(("speed", "has_direction"), [(0.001, False), (0.06, True)])
+def test_a_calm_comes_from_nowhere(speed, has_direction):
+    """Of several flights one may be in still air: off by 1000 degrees is no direction."""
+    wind = replace(
+        by_hand().vehicle.wind, north=speed, east=0.0, sigma_north=0.02, sigma_east=0.02, change=0.0
+    )
+    vehicle = replace(by_hand().vehicle, wind=wind)
+    told = {s.name: s for s in settings_of(vehicle, (), vehicle.effects, RECORDING)}
+    assert told["SIM_WIND_SPD"].value == pytest.approx(speed)
+    assert ("SIM_WIND_DIR" in told) == has_direction
+
+
 @pytest.mark.parametrize("primary", [0.0, 1.0])
 def test_the_ratio_is_that_of_the_airspeed_sensor_by_which_the_autopilot_flies(primary):
     parameters = {"ARSPD_PRIMARY": primary, "ARSPD_RATIO": 1.8, "ARSPD2_RATIO": 2.2}

@@ -269,6 +269,22 @@ def test_planes_with_little_side_force_fly_what_they_are_told(c_y_b):
     assert np.abs(flight.w_b[inside]).max() < 4.0
 
 
+def test_a_rudder_that_can_hold_a_large_slip_holds_it():
+    """Aerobatic planes fly on their side; nothing but the rudder's end limits the slip."""
+    n = 20_000
+    t = np.arange(n) * DT
+    slip = 0.6 * np.sin(0.4 * t)
+    v_n = np.column_stack([np.full(n, 15.0), np.zeros(n), np.full(n, -1.0)])
+    told = Motion(v_n, np.zeros(n), np.zeros(n), slip, np.ones(n, bool), np.zeros(n, bool), Start())
+    flight = flown(told, Wing(c_n_deltar=0.4, c_y_deltar=-0.8), Air(), HOME)
+    middle = slice(6000, 14_000)
+    u_b = rotation.rotate_back(flight.R_nb, flight.v_n)[middle]
+    assert np.arctan2(u_b[:, 1], u_b[:, 0]) == pytest.approx(slip[middle], abs=0.03)
+    outputs = flight.outputs
+    missing = outputs.mass[:, None] * flight.f_b - outputs.thrust_b - outputs.drag_b
+    assert np.abs(missing[middle]).max() < 1e-9
+
+
 def test_a_push_over_without_lift_does_not_roll_the_plane_over():
     n = 20_000
     t = np.arange(n) * DT

@@ -12,9 +12,12 @@ import pytest
 
 from onboard.answers.flown_again import Courses, beside, flown_again, numbers_twice
 from onboard.answers.match import Setting
+from onboard.answers.match_document import match_document
 from onboard.cli import match_verify
 from onboard.cli.main import run
-from onboard.cli.match_verify import air_of, altitude_of, as_sitl, craft_of
+from onboard.cli.match import flown_again_table
+from onboard.cli.match_verify import air_of, altitude_of, as_sitl, craft_of, turning_rudder
+from onboard.cli.terminal import Terminal
 from onboard.core.vehicle.atmosphere import density
 from onboard.core.vehicle.plane_airframe import MASS_KG, PlaneAirframe
 from onboard.core.vehicle.records import Compared, Difference
@@ -61,6 +64,39 @@ def test_numbers_agree_within_5_per_cent_or_3_sigma():
         second = with_numbers(rotor_drag__mcoef=Compared(0.5, again, 0.001, "1/s"))
         (twice,) = numbers_twice(first, second).values()
         assert twice.agrees is agrees
+
+
+def test_a_flight_that_tells_nothing_is_not_flown_like_the_recording(monkeypatch, capsys):
+    """All of no numbers agree; what was found has to be found again."""
+    flights = iter([course(), course(), course(force=(6.0, 0.0, -9.8))])
+    monkeypatch.setattr("onboard.answers.flown_again.courses", lambda _: next(flights))
+    first = with_numbers(rotor_drag__mcoef=Compared(0.25, 0.5, 0.001, "1/s"))
+    why = "force and velocity contradict each other"
+    silent = replace(first.vehicle, numbers={}, effects=(), series=None, note=why)
+    record = flown_again(first, replace(first, vehicle=silent), "a", "b", "c")
+    assert not record.agrees
+    Terminal().print(flown_again_table(record))
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"could not fly it as it was: {why}" in said
+    assert "rotor_drag.mcoef: 0.5000 recorded, not told by the simulator's flight" in said
+    assert why in Page.of(match_html(first, record)).words
+    assert match_document(first, record).verified.untold == why
+
+
+def test_a_number_that_is_not_told_again_does_not_agree():
+    first = with_numbers(rotor_drag__mcoef=Compared(0.25, 0.5, 0.001, "1/s"))
+    (twice,) = numbers_twice(first, with_numbers()).values()
+    assert not twice.agrees
+
+
+@pytest.mark.parametrize(("found", "moment"), [(-0.8, 0.4), (-0.2, 0.1), (0.0, 0.1)])
+def test_a_rudder_that_pushes_more_turns_more(found, moment):
+    """The arm of the tail is the same; one that pushes less has turned the plane all the same."""
+    number = Compared(-0.2, found, 0.02, "1")
+    effect = Difference("side_force", "vehicle", {"c_y_deltar": number})
+    match = by_hand(vehicle="plane", effects=(effect,), numbers={"side_force.c_y_deltar": number})
+    assert turning_rudder(match.vehicle) == pytest.approx(moment)
+    assert turning_rudder(by_hand(vehicle="plane").vehicle) == Wing().c_n_deltar
 
 
 def test_thrust_is_compared_with_the_first_flights_and_not_with_the_frame_that_has_it():

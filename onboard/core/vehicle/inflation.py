@@ -76,10 +76,14 @@ def inflated(information: Array, prior: Array, inflation: Array) -> Array:
         prior: (m,) weights, the diagonal of ``L``.
         inflation: (m,) as of :func:`inflation_of`.
     """
-    inverse = np.linalg.inv(information)
-    known = inverse @ (prior[:, None] * inverse)
-    root = np.sqrt(inflation)
-    out: Array = (inverse - known) * np.outer(root, root) + known
+    # In the directions in which rows and prior are both diagonal each part is a square, whatever
+    # rounding has left of it: as a difference of two inverses the rows' may be less than nothing.
+    size = 1.0 / np.sqrt(prior)
+    told, axes = np.linalg.eigh(size[:, None] * information * size - np.eye(len(prior)))
+    told = np.maximum(told, 0.0)
+    known = size[:, None] * axes / (1.0 + told)
+    by_rows = np.sqrt(inflation)[:, None] * known * np.sqrt(told)
+    out: Array = by_rows @ by_rows.T + known @ known.T
     return out
 
 

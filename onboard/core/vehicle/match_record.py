@@ -101,19 +101,18 @@ def differences(m: Matched) -> tuple[Difference, ...]:
             out.append(Difference(DELAY, "sensor", {"delay": late}))
             continue
         apart = fit.theta[places] - m.model.nominal[places]
-        columns = [
-            k for k, a in enumerate(m.model.axes) if (a in FORCE) != (name == AirspeedScale.name)
-        ]
+        acts = fit.jacobian.of(places) @ apart
+        shown_by = _shown_by(m, acts, sensor=name == AirspeedScale.name)
         out.append(
             Difference(
                 name,
                 "vehicle",
                 {s.name: Compared(s.nominal, s.value, s.sigma, s.unit) for s in shown},
                 max(chosen.gains[name], 0.0) / whole if whole > 0.0 else 0.0,
-                places_of(m.model.flight, fit.jacobian.of(places) @ apart, m.model.axes, fit.block),
+                places_of(m.model.flight, acts, m.model.axes, fit.block),
                 chosen.rivals[name],
-                rms(left_by(m.choices, without)[:, columns]),
-                rms(m.held[:, columns]),
+                _weighted(left_by(m.choices, without), shown_by),
+                _weighted(m.held, shown_by),
             )
         )
     if m.turbulence.found:
@@ -123,6 +122,29 @@ def differences(m: Matched) -> tuple[Difference, ...]:
             value["rms_with_faster"] = Compared(0.0, t.whole, t.whole_sigma, "m/s")
         out.append(Difference("turbulence", "vehicle", value, 0.0))
     return tuple(out)
+
+
+def _shown_by(m: Matched, acts: Array, *, sensor: bool) -> Array:
+    """(k,) weights of the axes that show an effect: its squares over those of the axis's noise.
+
+    Along an axis on which it does not act it proves nothing, whatever the others do there.
+
+    Args:
+        m: what was found.
+        acts: (n, k) force by the effect, m/s^2, and what it adds to an airspeed, m/s.
+        sensor: whether the airspeed's axis alone has it, or the force's.
+    """
+    its = np.array([(axis in FORCE) != sensor for axis in m.model.axes])
+    noise = [rms(noise.size(m.fit.sensitivity[:, k])) for k, noise in enumerate(m.fit.noise)]
+    size = np.sqrt(np.mean(acts**2, axis=0)) / np.array(noise)
+    out: Array = its * np.square(size)
+    # What acts nowhere that it is asked for (a change of nothing) is shown by all alike.
+    return out if out.any() else its.astype(np.float64)
+
+
+def _weighted(residual: Array, weights: Array) -> float:
+    """Root of the mean square of (n, k), of which axes have weights (k,)."""
+    return math.sqrt(float(np.average(np.mean(residual**2, axis=0), weights=weights)))
 
 
 def not_testable_of(

@@ -9,6 +9,7 @@ import numpy as np
 from onboard.core.maths.arrays import Array
 from onboard.core.vehicle.air import Air
 from onboard.core.vehicle.effects.air_density import AirDensity
+from onboard.core.vehicle.effects.airspeed_lag import AirspeedLag
 from onboard.core.vehicle.effects.airspeed_scale import COLUMN, AirspeedScale
 from onboard.core.vehicle.effects.attitude_error import AttitudeError
 from onboard.core.vehicle.effects.beyond import Beyond
@@ -179,6 +180,7 @@ def plane_model(
         PropellerInflow(frame),
         *(Beyond(key, WINGS[key]) for key in beyond if key in WINGS),
         *([AirspeedScale(flight.rho)] if sensor else []),
+        *([own([AirspeedLag() for _ in range(flight.parts)])] if sensor else []),
         own([SensorOffset(sigma) for sigma in np.atleast_2d(force_sigma)]),
     ]
     effects = tuple(e for e in everything if not e.missing(still))

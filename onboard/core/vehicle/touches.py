@@ -1,9 +1,10 @@
-"""Where a copter hit the ground without standing on it: a bounce is no flight, and no stand.
+"""Where a vehicle hit the ground without standing on it: a bounce is no flight, and no stand.
 
 The ground pushes for milliseconds, of which samples of an accelerometer keep what they happen to
 meet.  What the velocity jumps by is then no integral of the force, and a calibration or an airframe
 that is fitted over it makes up for that: on a log of 25 samples a second by a seventh of the scale,
-and a curve of it.
+and a curve of it.  A plane that hops over a field on its wheels is held to its way by them: what
+they push with would be a side force of its airframe, and lift.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ def touched_spans(
 ) -> list[tuple[float, float]]:
     """Intervals (s) about bounces, with a margin to either side.
 
-    At one a copter sinks, then climbs, no higher above the ground than a receiver's height wanders,
-    and is shaken across its rotors as air cannot do: drag is a quarter of the speed through the
-    air, so that a step of :data:`APART_FORCE_M_S2` from one sample to the next would be a gust of
-    six metres a second, and is further off than steps of this flight ever are by their scatter.
+    At one a vehicle sinks, then climbs, no higher above the ground than a receiver's height
+    wanders, and is shaken across its rotors, or along and across its wings, as air cannot do: a
+    copter's drag is a quarter of the speed through the air, so that a step of
+    :data:`APART_FORCE_M_S2` from one sample to the next would be a gust of six metres a second.  A
+    plane's side force would have it of a gust of half a metre a second, at once: beside that it is
+    further off than steps of this flight ever are by their scatter, which its gusts are in.
 
     Args:
         t: (n,) times of fixes, s.

@@ -25,7 +25,8 @@ SLOWEST = 11.0
 STANDING_PITCH = 0.03
 ATTACK = (-0.3, 0.4)
 """Angles of attack that are looked at, rad."""
-MOST_SLIP = 0.4
+MOST_SLIP = 1.2
+"""Sideslip that is looked at, rad: from a right angle on there is no air from ahead."""
 EASE = 0.05
 """Sideslip that is as little asked for as a radian of bank: where a push-over leaves no lift to be
 leant, a little sideslip makes the side force."""

@@ -78,6 +78,20 @@ def test_what_was_known_before_is_as_sure_as_it_was_and_what_two_know_together_i
     assert inflated(rows + np.diag(prior), prior, np.ones(2)) == pytest.approx(plain)
 
 
+def test_no_variance_is_less_than_nothing_where_rows_that_tell_all_of_a_few_contradict():
+    """A plane that slips once by 60 degrees: what it tells is 1e15 times what was known before."""
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        prior = 10.0 ** rng.uniform(-2.0, 4.0, 12)
+        rows = 1e5 * np.sqrt(prior) * rng.normal(size=(4, 12))
+        inflation = 10.0 ** rng.uniform(0.0, 6.0, 12)
+        C = inflated(rows.T @ rows + np.diag(prior), prior, inflation)
+        # In units of what was known before: never less than nothing in any direction.
+        scaled = C * np.sqrt(np.outer(prior, prior))
+        assert np.linalg.eigvalsh(scaled)[0] > -1e-9 * np.max(np.diag(scaled))
+        assert np.all(np.diag(C) > 0.0)
+
+
 def test_an_error_of_known_size_adds_what_it_does_to_the_estimate():
     """A number on which it acts alone is as unsure as the error; none is surer than by scatter."""
     prior, N = np.full(2, 1e-6), np.diag([4.0, 100.0])
