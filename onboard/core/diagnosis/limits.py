@@ -59,6 +59,12 @@ LARGEST_TURN: Final = 0.2
 """rad/s over the last spacing that a gyroscope may miss in a shock, one sigma: 6 degrees, as much
 as a hard landing turns a vehicle by [physics]."""
 
+# The model that stands (settling).
+
+LINEAR_SHARE: Final = 0.2
+"""Of the size of an effect in proportion to the force, by which it is off as long as it counts from
+nothing: a curve of 0.06 per g is so much of three times gravity [physics]."""
+
 # Clipping (clipping, screening).
 
 FEWEST_CLIPPED: Final = 5

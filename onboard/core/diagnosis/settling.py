@@ -9,6 +9,7 @@ import numpy as np
 from onboard.core.diagnosis.examination import Examination
 from onboard.core.diagnosis.hypotheses import Choice
 from onboard.core.diagnosis.jumps import candidate_of
+from onboard.core.diagnosis.limits import LINEAR_SHARE
 from onboard.core.diagnosis.score import least
 from onboard.core.diagnosis.search import searched
 from onboard.core.diagnosis.selection import Fitter
@@ -102,6 +103,12 @@ def _final(full: Examination, choice: Choice, families: Sequence[Effect]) -> Exa
         refused=full.refused_velocities(),
     )
     theta, covariance = final.model.taken_over(model, fit.theta, known)
+    for f in families:
+        if f.in_proportion:
+            # A size about nothing is too large or too small by as much as the effect is of the
+            # force; gates that believed it would leave out the flight that says so.
+            index = final.indices(f)
+            covariance[index, index] += (LINEAR_SHARE * theta[index]) ** 2
     return final.with_rows(final.about_point(theta), covariance)
 
 
