@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.concealing import Secret
+from benchmarks.explaining import heard
 from onboard.core.diagnosis.procedure import examine
 from onboard.core.diagnosis.records import Verdict
 from onboard.core.estimate.calibrator import Calibrator
@@ -217,3 +219,17 @@ def test_a_large_tilt_does_not_hide_what_the_heading_is_off_by():
     yaw = found["heading_error"]["yaw"]
     assert abs(yaw.value - north.yaw) < 3.0 * yaw.sigma
     assert yaw.sigma < 0.04
+
+
+@pytest.mark.slow
+def test_gates_do_not_leave_out_the_flight_that_says_how_large_an_effect_is():
+    # About nothing a curve of 0.05 per g looks a fifth too large.
+    bent = Secret(163070, "plane", "single", ("scale_nonlinearity",), "large").spec()
+    found = examine(heard(bent), 1)
+    said = found.diagnosis()
+    assert [e.name for e in said.effects] == ["scale_nonlinearity"]
+    z = said.effects[0].unknowns["z"]
+    assert abs(z.value - bent.effects[0].z) < 3.0 * z.sigma
+    rows = found.evidence.final.all_blocks, found.evidence.full.all_blocks
+    few, every = (sum(b.sums.rows for b in blocks) for blocks in rows)
+    assert few > 0.99 * every
