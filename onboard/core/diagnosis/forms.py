@@ -10,7 +10,6 @@ unknowns is as likely, and so are all choices of that many (Scott and Berger, 20
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import comb
 
@@ -22,10 +21,7 @@ from onboard.core.maths.arrays import Array
 
 
 def score_in_best_form(
-    fitter: Fitter,
-    beside: Sequence[int],
-    c: Candidate,
-    held: Array | None = None,
+    fitter: Fitter, before: Fit, after: Fit, c: Candidate, held: Array | None = None
 ) -> float:
     """The score, for rivals, of those unknowns of an effect that make it most surprising.
 
@@ -34,12 +30,11 @@ def score_in_best_form(
 
     Args:
         fitter: has the columns.
-        beside: columns that are in the model anyway.
+        before: the fit without it.
+        after: the fit with all of it.
         c: the effect, whole.
         held: (m,) values of what is not in the model.
     """
-    before = fitter.fit(beside, held, held_out=False)
-    after = fitter.fit([*beside, *c.index], held, held_out=False)
     best = c.common_score(fitter, before, after)
     if c.witness is not None or len(c.index) != len(c.plausible):
         return best
@@ -47,7 +42,7 @@ def score_in_best_form(
     for k in range(most - 1, 0, -1):
         form = _without_least(fitter, after, form)
         form = replace(form, places=c.places * most * comb(most, k))
-        after = fitter.fit([*beside, *form.index], held, held_out=False)
+        after = fitter.fit([*before.free, *form.index], held, held_out=False)
         best = max(best, form.common_score(fitter, before, after))
     return best
 

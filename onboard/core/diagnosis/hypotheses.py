@@ -94,7 +94,7 @@ def confounders_of(
     """
     before = fitter.fit(rest, held, held_out=False)
     with_it = fitter.fit([*rest, *target.index], held, held_out=False)
-    own = score_in_best_form(fitter, rest, target, held)
+    own = score_in_best_form(fitter, before, with_it, target, held)
     nearest: dict[str, Confounder] = {}
     for other in (o for o in others if o.new_beside(rest)):
         instead = fitter.fit([*rest, *other.index], held, held_out=False)
@@ -104,7 +104,7 @@ def confounders_of(
         both = fitter.fit([*rest, *target.index, *other.index], held, held_out=False)
         if other.score(fitter, with_it, both) >= least():
             continue
-        behind = own - score_in_best_form(fitter, rest, other, held)
+        behind = own - score_in_best_form(fitter, before, instead, other, held)
         if other.effect not in nearest or behind < nearest[other.effect].delta_bic:
             nearest[other.effect] = Confounder(other.effect, behind)
     return sorted(nearest.values(), key=lambda c: c.delta_bic)

@@ -122,10 +122,11 @@ def _in_the_place_of(choice: Choice, chosen: Candidate) -> list[Undecided]:
     rest = [i for i in choice.free if i not in chosen.index]
     before, with_it = fitter.fit(rest), fitter.fit(choice.free)
     own = log_odds(chosen.score(fitter, before, with_it))
-    most = score_in_best_form(fitter, rest, chosen)
+    most = score_in_best_form(fitter, before, with_it, chosen)
     found = [(chosen, 0.0, before)]
     for c, _, fit in _likely(fitter, rest, before, _others(choice)):
-        found.append((c, own - 0.5 * (most - score_in_best_form(fitter, rest, c)), fit))
+        behind = most - score_in_best_form(fitter, before, fit, c)
+        found.append((c, own - 0.5 * behind, fit))
     likely = shares(own, [odds for _, odds, _ in found])
     return [
         _instead(fitter, c, share, with_it, fit)

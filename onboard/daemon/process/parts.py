@@ -95,11 +95,8 @@ class Parts:
         situation = Situation(link, board, parameters, witness, proposals)
         handover = _handover(configuration, notices, situation, clock, calendar)
         streams = Streams(settings.stream_requests(configuration.link.rates))
-        streams.writing = lambda: pusher.writes_on_the_ground
         hindrance = Hindrance(link, parameters, streams, traffic, has_key=signing is not None)
-        pusher.late = lambda: link.boot_clock.lateness.seconds
-        link.presence.held = lambda: pusher.busy
-        link.presence.committed = lambda: pusher.has_written or handover.has_learned
+        _introduce(link, streams, pusher, handover)
         return cls(
             calendar=calendar,
             notices=notices,
@@ -134,6 +131,14 @@ class Parts:
     def participants(self) -> tuple[Participant, ...]:
         """Those that speak with the autopilot."""
         return self.streams, self.board, self.parameters, self.pusher
+
+
+def _introduce(link: Link, streams: Streams, pusher: Pusher, handover: Handover) -> None:
+    """Let each know what it must of those that were made after it."""
+    streams.writing = lambda: pusher.writes_on_the_ground
+    pusher.late = lambda: link.boot_clock.lateness.seconds
+    link.presence.held = lambda: pusher.busy
+    link.presence.committed = lambda: pusher.has_written or handover.has_learned
 
 
 def _link(
