@@ -182,6 +182,9 @@ GYRO_SHARE: Final = 0.03
 STAMPED_S: Final = 5e-3
 """s by which stamps of two attitudes may be off together, so that a turn is off by as much of its
 rate: six sigma of :data:`~onboard.core.filter.limits.STAMP_JITTER_S` [physics]."""
+ATTITUDE_LATE_S: Final = 0.2
+"""s by which an attitude is late or early, one sigma of what is expected
+(:class:`~onboard.core.model.nuisances.ImuDelay`) [probability]."""
 HEADING_LOOKED_AT_S: Final = 60.0
 """s from the start of an uninterrupted flight in which the right heading is looked for: twice what
 a compass is off for after a take-off [physics]."""

@@ -14,11 +14,12 @@ turns by what is left of the other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from onboard.core.inputs.limits import (
+    ATTITUDE_LATE_S,
     GYRO_SHARE,
     HEADING_EVERY_S,
     HEADING_LOOKED_AT_S,
@@ -27,7 +28,7 @@ from onboard.core.inputs.limits import (
 )
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
 from onboard.core.inputs.segments import Batch, Segment
-from onboard.core.maths.arrays import Array
+from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.frames import (
     rotation_from_euler,
     rotation_from_vector,
@@ -36,6 +37,14 @@ from onboard.core.maths.frames import (
 
 STEADY_THROTTLE = "steady_throttle"
 """Name of the slow signal of a throttle that something was taken out of."""
+
+
+DELAYS_S = ATTITUDE_LATE_S * np.linspace(-2.0, 2.0, 41)
+"""By which an attitude may be late, s: to two sigma of what is expected."""
+UNLIKELY = np.where(
+    np.abs(DELAYS_S) > 1e-9, 0.5 * (DELAYS_S / ATTITUDE_LATE_S) ** 2 + np.log(len(DELAYS_S)), 0.0
+)
+"""Their surprise, nats: as likely as that one of them is there is that none is."""
 
 
 class SteadyHeading:
@@ -52,6 +61,8 @@ class SteadyHeading:
         the times."""
         self._sampled = np.zeros(0)
         """Until when the throttle changed with each of them: its next sample, s."""
+        self._missed = UNLIKELY.copy()
+        """What is missed with each delay of the attitude, steps."""
         self._right = np.zeros(2)
         """Sums of the right heading."""
 
@@ -65,10 +76,10 @@ class SteadyHeading:
         first, last = float(batch.fixes.t[0]), float(batch.fixes.t[-1])
         if batch.fresh:
             self._begin(first)
-        t, by = pulls(batch.segment)
-        since = self._sampled[-1] if len(self._sampled) else -np.inf
-        sampled, changes = _throttle_by(batch.segment, t, since)
-        by = np.column_stack([by, changes])
+        steps = self._steps(batch.segment)
+        t = steps.t[1:][steps.pulled]
+        sampled, changes = _throttle_by(batch.segment, steps)
+        by = np.column_stack([steps.missed[steps.pulled], changes])
         now, later = (t > first) & (t <= last), t > last
         self._t = np.append(self._t, t[now])
         self._sampled = np.append(self._sampled, sampled[now])
@@ -86,6 +97,19 @@ class SteadyHeading:
         # Nearly always nothing is: of each batch of hours it need not be asked whenever one comes.
         steady = [_turned(b, back[:1], back[1:]) for b in run] if back.any() else run
         return [*steady, _turned(batch, off, throttle)]
+
+    def _steps(self, segment: Segment) -> Steps:
+        """Those of a segment that comes next.
+
+        A late attitude turns when the gyroscope no longer does.  By how much it is late its tilt
+        tells, in those parts of the flight in which the heading seems to be pulled.
+        """
+        turns = Turns(segment)
+        steps = turns.steps(0.0)
+        if not steps.pulled.any():
+            return steps
+        self._missed += turns.missed_tilt()
+        return turns.steps(DELAYS_S[np.argmin(self._missed)])
 
     def _right_until(self, last: float) -> Array:
         """What heading and throttle were pulled by for most of the time."""
@@ -107,64 +131,115 @@ def _times(segment: Segment) -> Array:
     return segment.slow["throttle"][0] if "throttle" in segment.slow else np.zeros(0)
 
 
-def _throttle_by(segment: Segment, t: Array, since: float) -> tuple[Array, Array]:
+def _throttle_by(segment: Segment, steps: Steps) -> tuple[Array, Array]:
     """What the throttle changed by while the heading was pulled.
 
-    When between two of its samples it did nobody knows: as quickly, and just then, as the heading.
+    When between two of its samples it did, its samples do not say.  If it turns the heading, it
+    changed as what the gyroscope did not turn by: each pull has its share of the change from one
+    sample to the next, be it all or a part that was quick enough to be seen as a pull.
 
     Args:
         segment: samples.
-        t: (j,) times of attitudes until which the heading has been pulled, s.
-        since: what it changed by until then is counted, s.
+        steps: those of its heading, of which k pulled.
 
     Returns:
-        (j,) times until which each of the changes goes, s, and (j,) the changes.
+        (k,) times of samples from which on each of these changes is in them, s, and (k,) the
+        changes.
     """
-    at = _times(segment)
-    if len(t) == 0 or len(at) < 2:
-        return t, np.zeros(len(t))
-    x = segment.slow["throttle"][1]
-    begun = segment.t_attitude[np.searchsorted(segment.t_attitude, t) - 1]
-    first = np.maximum(np.searchsorted(at, begun, side="right") - 1, 0)
-    last = np.minimum(np.searchsorted(at, t, side="left"), len(at) - 1)
-    counted = np.searchsorted(at, since, side="right") - 1
-    until = np.maximum.accumulate(np.concatenate([[max(counted, 0)], last[:-1]]))
-    return at[last], np.where(last > until, x[last] - x[np.maximum(first, until)], 0.0)
+    at, pulled = _times(segment), steps.pulled
+    ends = steps.t[1:][pulled]
+    if len(ends) == 0 or len(at) < 2:
+        return ends, np.zeros(len(ends))
+    missed = np.stack([steps.missed, np.where(steps.pulled, steps.missed, 0.0)])
+    so_far = np.hstack([np.zeros((2, 1)), np.cumsum(missed, axis=1)])
+    turned, by_pulls = np.diff([np.interp(at, steps.t, each) for each in so_far], axis=1)
+    # No pull has more than all of a change, and none what goes against the rest of the turn.
+    whole = np.where(np.abs(by_pulls) > np.abs(turned), by_pulls, turned)
+    change = np.diff(segment.slow["throttle"][1])
+    per_rad = np.divide(change, whole, out=np.zeros_like(change), where=by_pulls * turned > 0.0)
+    # In the mean over each step, which may go over a sample.
+    mean = np.interp(steps.t, at, np.append(0.0, np.cumsum(per_rad * np.diff(at))))
+    shares = steps.missed * np.diff(mean) / np.diff(steps.t)
+    last = np.minimum(np.searchsorted(at, ends, side="left"), len(at) - 1)
+    return at[last], shares[pulled]
 
 
-def pulls(segment: Segment) -> tuple[Array, Array]:
-    """Attitudes until which the heading has been pulled.
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """From one recorded heading to the next.
 
-    Returns:
-        Their times (j,), s, and by how much since the attitude before (j,), rad.
+    Attributes:
+        t: (n + 1,) times of the headings, s.
+        missed: (n,) what the heading turned by and the gyroscope did not, rad.
+        pulled: (n,) where that is more than any gyroscope may be off by.
     """
-    t = segment.t_attitude
-    if len(t) < 2 or len(segment.t) < 2:
-        return np.zeros(0), np.zeros(0)
-    R, step = segment.R_attitude[:], np.diff(t)
-    turns, way, missing = _turns(segment, t)
-    expected = R[:-1] @ rotation_from_vector(turns)
-    missed = vector_from_rotation(R[1:] @ np.swapaxes(expected, -1, -2))[:, 2]
-    allowed = PULLED_RAD_S * step + GYRO_SHARE * way + STAMPED_S * way / step + missing
-    known = (t[:-1] >= segment.t[0]) & (t[1:] <= segment.t[-1])
-    pulled = known & (np.abs(missed) > allowed)
-    return t[1:][pulled], missed[pulled]
+
+    t: Array
+    missed: Array
+    pulled: Mask
 
 
-def _turns(segment: Segment, t: Array) -> tuple[Array, Array, Array]:
-    """What a gyroscope turns by between times ``t`` (k,), s.
+class Turns:
+    """What heading and gyroscope of a segment turn by from one recorded heading to the next."""
 
-    Returns:
-        (k - 1, 3) that, rad; (k - 1,) the way there, rad; (k - 1,) by how much its samples may miss
-        it, rad: where the rate changes from one to the next, a quarter of a triangle.
-    """
-    h, w = np.diff(segment.t), segment.w_b
-    size = np.linalg.norm(w, axis=1)
-    change = np.linalg.norm(np.diff(w, axis=0), axis=1)
-    rates = np.column_stack([0.5 * (w[1:] + w[:-1]), 0.5 * (size[1:] + size[:-1]), 0.25 * change])
-    sums = np.vstack([np.zeros(5), np.cumsum(rates * h[:, None], axis=0)])
-    made = np.diff([np.interp(t, segment.t, sums[:, k]) for k in range(5)], axis=1).T
-    return made[:, :3], made[:, 3], made[:, 4]
+    def __init__(self, segment: Segment) -> None:
+        self._t, self._of = segment.t_attitude, segment.t
+        self._R = segment.R_attitude[:]
+        h, w = np.diff(segment.t), segment.w_b
+        size = np.linalg.norm(w, axis=1)
+        change = np.linalg.norm(np.diff(w, axis=0), axis=1)
+        rates = [0.5 * (w[1:] + w[:-1]), 0.5 * (size[1:] + size[:-1]), 0.25 * change]
+        made = np.cumsum(np.column_stack(rates) * h[:, None], axis=0)
+        self._sums = np.vstack([np.zeros(5), made]).T
+        """(5, n) turn (3) and way until each sample, rad, and by how much the samples may miss it:
+        where the rate changes from one to the next, a quarter of a triangle."""
+
+    def steps(self, delay: float) -> Steps:
+        """The steps of an attitude that is late by ``delay``, s."""
+        if len(self._t) < 2 or len(self._of) < 2:
+            return Steps(self._t[:1], np.zeros(0), np.zeros(0, dtype=bool))
+        turns = self._over(delay, self._sums)
+        expected = self._R[:-1] @ rotation_from_vector(turns[:3].T)
+        off = self._R[1:] @ np.swapaxes(expected, -1, -2)
+        missed = np.where(self._known(delay), vector_from_rotation(off)[:, 2], 0.0)
+        return Steps(self._t, missed, np.abs(missed) > self._allowed(turns))
+
+    def missed_tilt(self) -> Array:
+        """How much of the tilt is missed with each of :data:`DELAYS_S`, steps.
+
+        It is late as the heading is, and nothing sets it anew.  Of a step at the most all is
+        missed.  To first order in what a step turns by.
+
+        Returns:
+            (k,).
+        """
+        known = self._known(DELAYS_S[0]) & self._known(DELAYS_S[-1])
+        turned = vector_from_rotation(self._R[1:] @ np.swapaxes(self._R[:-1], -1, -2))[:, :2].T
+        level = 0.5 * (self._R[1:, :2] + self._R[:-1, :2])
+        allowed = self._allowed(self._over(0.0, self._sums))
+        shares = []
+        for delay in DELAYS_S:
+            by = np.einsum("ikj,ji->ki", level, self._over(delay, self._sums[:3]))
+            missed = np.hypot(*(turned - by)) / allowed
+            shares.append(np.minimum(missed, 1.0)[known].sum())
+        return np.array(shares)
+
+    def _over(self, delay: float, sums: Array) -> Array:
+        """(k, n) what sums (k, m) grow by over each step."""
+        over: Array = np.diff([np.interp(self._t - delay, self._of, each) for each in sums], axis=1)
+        return over
+
+    def _known(self, delay: float) -> Mask:
+        """Steps over which there is a gyroscope."""
+        t = self._t - delay
+        known: Mask = (t[:-1] >= self._of[0]) & (t[1:] <= self._of[-1])
+        return known
+
+    def _allowed(self, turns: Array) -> Array:
+        """What a gyroscope may miss of each step, rad."""
+        step, (way, missing) = np.diff(self._t), turns[3:]
+        allowed: Array = PULLED_RAD_S * step + GYRO_SHARE * way + STAMPED_S * way / step + missing
+        return allowed
 
 
 def _turned(batch: Batch, off: Array, throttle: Array) -> Batch:

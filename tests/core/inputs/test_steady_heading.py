@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 
 from onboard.core.inputs.reported_attitude import ReportedAttitude
 from onboard.core.inputs.segments import Batch, Fixes, Segment
-from onboard.core.inputs.steady_heading import SteadyHeading, pulls
+from onboard.core.inputs.steady_heading import STEADY_THROTTLE, SteadyHeading, Turns
 from onboard.core.maths.frames import euler_from_rotation, rotation_from_euler
 
 LENGTH_S, MARGIN_S, IMU_HZ, ATTITUDE_HZ = 60.0, 0.7, 50.0, 10.0
-ROLL = 0.3
 
 
 def yaw(t):
@@ -22,26 +21,42 @@ def yaw(t):
     return 0.8 * np.sin(0.5 * t) + np.sin(0.6 * t + 1.0)
 
 
+def roll(t):
+    return 0.3 + 0.15 * np.sin(1.7 * t)
+
+
+def rolling(t):
+    return 0.255 * np.cos(1.7 * t)
+
+
 def turning(t):
     return 0.4 * np.cos(0.5 * t) + 0.6 * np.cos(0.6 * t + 1.0)
 
 
-def cut(error, borders, *, bias=0.0, reported=True):
-    """Batches of a flight whose recorded heading errs by ``error(t)``, rad, as recorded."""
+def cut(error, borders, *, bias=0.0, reported=True, late=0.0, throttle=None):
+    """Batches of a flight whose recorded heading errs by ``error(t)``, rad, as recorded.
+
+    All of the attitude is ``late``, s.  Of ``throttle(t)`` there are four samples a second.
+    """
     out = []
     for first, last in itertools.pairwise(borders):
         t = np.arange(first - MARGIN_S, last + MARGIN_S, 1.0 / IMU_HZ)
         at = np.arange(np.ceil((first - MARGIN_S) * ATTITUDE_HZ), (last + MARGIN_S) * ATTITUDE_HZ)
         at = at / ATTITUDE_HZ
-        angles = np.stack([np.full(len(at), ROLL), np.zeros(len(at)), yaw(at) + error(at)], axis=1)
+        then = at - late
+        angles = np.stack([roll(then), np.zeros(len(at)), yaw(then) + error(at)], axis=1)
         recorded = ReportedAttitude(angles, (0.0, 0.0, 0.0))
         # About a vertical that is rolled in the body.
-        w_b = (turning(t) + bias)[:, None] * np.array([0.0, np.sin(ROLL), np.cos(ROLL)])
+        by = turning(t) + bias
+        w_b = np.stack([rolling(t), by * np.sin(roll(t)), by * np.cos(roll(t))], axis=1)
         fixes = np.round(np.arange(first, last + 0.01, 0.2), 6)
         n = len(fixes)
         segment = Segment(
             t, w_b, np.zeros((len(t), 3)), at, recorded if reported else recorded[:], np.eye(3)
         )
+        if throttle is not None:
+            sampled = np.arange(np.ceil(4.0 * at[0]), 4.0 * at[-1] + 1.0) / 4.0
+            segment = segment.with_slow({"throttle": (sampled, throttle(sampled))})
         none = np.zeros(n)
         out.append(
             Batch(
@@ -90,6 +105,40 @@ def test_the_heading_that_was_held_for_longest_is_the_right_one(name, reported):
     assert np.abs(error).max() < 0.01
 
 
+def throttle(t):
+    """Goes up and down at all rates; what is pulled by it only part of the time is quick."""
+    return 0.5 + 0.2 * np.sin(0.9 * t) + 0.15 * np.sin(1.3 * t * (1.0 + t / 100.0))
+
+
+@pytest.mark.parametrize("pull", [-0.35, 0.3, 0.7])
+@pytest.mark.parametrize("borders", [TENS, (0.0, 13.4, 20.2, 33.6, LENGTH_S)], ids=["tens", "odd"])
+def test_what_is_taken_out_of_the_throttle_is_what_pulled_the_heading(pull, borders):
+    run = joined(cut(lambda t: pull * throttle(t), borders, throttle=throttle))
+    off = []
+    for batch in run:
+        slow = batch.segment.slow
+        at, steady = slow.get(STEADY_THROTTLE, slow["throttle"])
+        t, error = left([batch])
+        off.append((error - pull * np.interp(t, at, steady))[(t > at[0]) & (t < at[-1])])
+    # Between four samples a second the throttle is not quite straight.
+    assert bool(np.concatenate(off).std() < 0.01 * abs(pull))
+    assert bool(np.abs(np.diff([each.mean() for each in off])).max() < 0.02 * abs(pull))
+
+
+@pytest.mark.parametrize("late", [-0.12, 0.06, 0.21])
+def test_an_attitude_that_is_late_is_not_pulled(late):
+    run = joined(cut(lambda t: 0.0 * t, TENS, late=late))
+    t, error = left(run)
+    assert float(np.abs(error - yaw(t - late) + yaw(t)).max()) < 0.02
+
+
+@pytest.mark.parametrize("late", [0.1, 0.2])
+def test_what_is_pulled_besides_being_late_is_taken_out(late):
+    run = joined(cut(EVENTS["set wrong and right"], TENS, late=late))
+    t, error = left(run)
+    assert float(np.abs(error - yaw(t - late) + yaw(t)).max()) < 0.02
+
+
 def test_a_heading_that_errs_slowly_is_left_as_it_was():
     slowly = cut(lambda t: 0.2 * np.sin(0.3 * t), TENS, bias=0.02)
     run = joined(slowly)
@@ -99,14 +148,14 @@ def test_a_heading_that_errs_slowly_is_left_as_it_was():
 def test_quick_turns_of_a_gyroscope_that_is_off_are_no_pulls():
     """A scale of 2 %, stamps off by two milliseconds, and a tenth of the samples: all at once."""
 
-    def rolling(t, late):
+    def rolled(t, late):
         return 6.0 * np.sin(2.0 * np.pi * 0.7 * (t - late)) / (2.0 * np.pi * 0.7)
 
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 30.0, 0.01)
     at = np.arange(1.0, 29.0, 0.04)
     zero, ahead = np.zeros(len(at)), np.full(len(at), 0.5)
-    angles = np.stack([rolling(at, 1e-3 * rng.uniform(-1.0, 1.0, len(at))), ahead, zero], axis=1)
+    angles = np.stack([rolled(at, 1e-3 * rng.uniform(-1.0, 1.0, len(at))), ahead, zero], axis=1)
     rate = 1.02 * 6.0 * np.cos(2.0 * np.pi * 0.7 * t)
     w_b = np.stack([rate, np.zeros(len(t)), np.zeros(len(t))], axis=1)
     for each in (1, 10):
@@ -118,7 +167,7 @@ def test_quick_turns_of_a_gyroscope_that_is_off_are_no_pulls():
             ReportedAttitude(angles, (0.0, 0.0, 0.0)),
             np.eye(3),
         )
-        assert len(pulls(segment)[0]) == 0
+        assert not Turns(segment).steps(0.0).pulled.any()
 
 
 @given(st.lists(st.floats(2.0, 58.0), min_size=1, max_size=5, unique=True))
