@@ -18,7 +18,7 @@ from onboard.core.maths.frames import (
     rotation_from_vector,
     vector_from_rotation,
 )
-from onboard.core.maths.interpolation import Hermite, straight
+from onboard.core.maths.interpolation import Hermite, curved, straight
 
 PARTS = 6
 """Into which the time from one attitude sample to the next is cut: 0.1 s at the longest, within
@@ -34,6 +34,10 @@ SLOW_SIGNALS = {
     "airspeed": "m/s",
 }
 """Names of the slow signals that a recording may have, and what they are."""
+STEADY_THROTTLE = "steady_throttle"
+"""Name of the slow signal of a throttle that something was taken out of (steady_heading)."""
+QUICK = frozenset({"throttle", STEADY_THROTTLE})
+"""Of these, what swings within a few of its samples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,10 +173,15 @@ class Segment:
         return np.minimum(np.maximum(k, 0), len(t_k) - 2)
 
     def slow_at(self, name: str, at: Array) -> Array | None:
-        """A slow signal at times ``at`` by straight lines; None if the recording lacks it."""
+        """A slow signal at times ``at``, the ends held; None if the recording lacks it.
+
+        By straight lines, but for a throttle, which swings as quickly as it is told.
+        """
         if name not in self.slow:
             return None
         t, x = self.slow[name]
+        if name in QUICK:
+            return curved(t, x, at)
         if x.ndim == 1:
             return np.interp(at, t, x)
         return straight(t, x, at)

@@ -7,8 +7,9 @@ turned: what the heading has turned by and the gyroscope has not is taken out.  
 headings before and after is the right one nobody says; it is the one that was held for longest.
 
 Motors whose current pulls the compass may do so in an instant, too.  So what the throttle changed
-by in those instants is taken out of it as well (:data:`STEADY_THROTTLE`): what is left of the one
-turns by what is left of the other.
+by in those instants is taken out of it as well
+(:data:`~onboard.core.inputs.segments.STEADY_THROTTLE`): what is left of the one turns by what is
+left of the other.
 """
 
 from __future__ import annotations
@@ -27,17 +28,13 @@ from onboard.core.inputs.limits import (
     STAMPED_S,
 )
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
-from onboard.core.inputs.segments import Batch, Segment
+from onboard.core.inputs.segments import STEADY_THROTTLE, Batch, Segment
 from onboard.core.maths.arrays import Array, Mask
 from onboard.core.maths.frames import (
     rotation_from_euler,
     rotation_from_vector,
     vector_from_rotation,
 )
-
-STEADY_THROTTLE = "steady_throttle"
-"""Name of the slow signal of a throttle that something was taken out of."""
-
 
 DELAYS_S = ATTITUDE_LATE_S * np.linspace(-2.0, 2.0, 41)
 """By which an attitude may be late, s: to two sigma of what is expected."""

@@ -91,3 +91,25 @@ def straight(t: Array, x: Array, at: Array) -> Array:
     share = np.clip((at - t[i]) / (t[i + 1] - t[i]), 0.0, 1.0)[..., None]
     out: Array = x[i] + share * (x[i + 1] - x[i])
     return out
+
+
+def curved(t: Array, x: Array, at: Array) -> Array:
+    """(*at.shape,) by the cubics of :class:`Hermite`, where samples are near; the ends held.
+
+    A straight line between samples of what swings within a few of them is smoother than it, and
+    what goes in proportion is found too large.  Where samples are missing nobody knows the slope at
+    either end as well as that is asked for: there the line is straight.
+
+    Args:
+        t: (n,) times of the samples, s.
+        x: (n,) the samples.
+        at: times of any shape, s.
+    """
+    lines: Array = np.interp(at, t, x)
+    h = np.diff(t)
+    if len(h) < 2 or h.min() <= 0.0:
+        return lines
+    near = h < 2.0 * np.median(h)
+    i = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(h) - 1)
+    inside = near[i] & (at >= t[0]) & (at <= t[-1])
+    return np.where(inside, Hermite(t, x[:, None])(at)[..., 0], lines)

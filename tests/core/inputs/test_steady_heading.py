@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from onboard.core.inputs.reported_attitude import ReportedAttitude
-from onboard.core.inputs.segments import Batch, Fixes, Segment
-from onboard.core.inputs.steady_heading import STEADY_THROTTLE, SteadyHeading, Turns
+from onboard.core.inputs.segments import STEADY_THROTTLE, Batch, Fixes, Segment
+from onboard.core.inputs.steady_heading import SteadyHeading, Turns
 from onboard.core.maths.frames import euler_from_rotation, rotation_from_euler
 
 LENGTH_S, MARGIN_S, IMU_HZ, ATTITUDE_HZ = 60.0, 0.7, 50.0, 10.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from onboard.core.inputs.steady_heading import STEADY_THROTTLE
+from onboard.core.inputs.segments import STEADY_THROTTLE
 from onboard.core.model.around import Around
 from onboard.core.model.regressors import Direct, Unknown
 from onboard.core.physics import response_curves as curves
