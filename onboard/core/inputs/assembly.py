@@ -28,12 +28,14 @@ from onboard.core.inputs.limits import (
     SAME_M_S2,
     SAME_RAD_S,
     SLOWEST_IMU_HZ,
+    THROTTLE_STEP,
     TOUCHED_S,
 )
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.reach import FAR, Reach
 from onboard.core.inputs.reported_attitude import Attitudes, ReportedAttitude
 from onboard.core.inputs.rolling import Rolling
+from onboard.core.inputs.rounded import unrounded
 from onboard.core.inputs.samples import GpsFix
 from onboard.core.inputs.segments import Batch, Fixes, Segment
 from onboard.core.inputs.streams import Streams
@@ -266,6 +268,9 @@ class Assembly:
             float(t[0]) - ATTITUDE_MARGIN_S, float(t[-1]) + ATTITUDE_MARGIN_S
         )
         slow = self.streams.slow_arrays(imu)
+        if "throttle" in slow:
+            times, told = slow["throttle"]
+            slow["throttle"] = times, unrounded(times, told, THROTTLE_STEP)
         warmth = self.streams.imus[imu].warmth(t, rows[:, 6])
         if warmth is not None:
             slow["temperature"] = warmth

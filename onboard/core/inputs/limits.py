@@ -191,6 +191,14 @@ a compass is off for after a take-off [physics]."""
 HEADING_EVERY_S: Final = 0.1
 """s between the moments whose median is taken [cost]."""
 
+# Rounded signals (rounded, assembly).
+
+THROTTLE_STEP: Final = 0.01
+"""Of a throttle in VFR_HUD: whole per cents [data sheet: MAVLink's common.xml]."""
+WHOLE: Final = 1e-6
+"""Of a step, by which what is told in whole steps is off them: a float's rounding, a hundred times
+[bound]."""
+
 # Single false samples (spikes).
 
 NEVER_SIGMAS: Final = 7.0
