@@ -100,6 +100,11 @@ def severity(diagnosis: Diagnosis) -> str:
     return verdict_of(diagnosis)[1]
 
 
+def lacks(diagnosis: Diagnosis) -> bool:
+    """Whether what there is to say is of something missing; else it is only worth knowing."""
+    return severity(diagnosis) != "info" and diagnosis.verdict is not Verdict.CLEAN
+
+
 def dangers(diagnosis: Diagnosis) -> list[str]:
     """Why one should not fly before something is cured: one sentence for each effect."""
     said = [(title_of(e.name), danger_of(e)) for e in diagnosis.effects]
