@@ -15,6 +15,7 @@ from onboard.answers.words import (
     signed,
 )
 from onboard.core.diagnosis.excess import HEADING
+from onboard.core.diagnosis.limits import NOISE
 from onboard.core.diagnosis.records import REPEATED, Diagnosis, Unused, Verdict
 from onboard.core.estimate.result import Calibration
 from onboard.core.physics.catalogue import (
@@ -37,8 +38,6 @@ COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 NOT_ONE = "These recordings are not one flight"
 DEAD = "The accelerometer repeated one reading in flight"
 MOST_NAMED = 2
-NOISE = 1.3
-"""Held-out residual, in units of the noise, up to which it may be called noise."""
 MOST_SPANS = 3
 WHERE_BELIEVED = " where GPS was believed"
 SAID_ABOVE = (

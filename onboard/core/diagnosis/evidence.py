@@ -16,7 +16,7 @@ from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
 from onboard.core.diagnosis.flight_constants import inconstant
 from onboard.core.diagnosis.hypotheses import Choice, of_others
-from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM
+from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM, NOISE
 from onboard.core.diagnosis.nuisance_effects import (
     constant_unknowns,
     nuisance_kinds,
@@ -214,7 +214,8 @@ class Judge:
                 "the two is false. " + note
             )
         note = " ".join([*(f"{c.words}; nothing of it is set." for c in changing), note])
-        left = self.final.solution.contradicts
+        # A model that is said to explain a flight predicts what it has not seen of it.
+        left = self.final.solution.contradicts or mismatch.held_out_after > NOISE
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
         if len(named) < len(effects):
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (

@@ -38,6 +38,8 @@ MATTERS_OFFSET: Final = 0.02
 """Move of an offset that is worth an effect, m/s^2 [use]."""
 MATTERS_HELD_OUT: Final = 0.03
 """Fall of the held-out residual that is worth an effect [use]."""
+NOISE: Final = 1.3
+"""Held-out residual, in units of the noise, up to which it may be called noise [use]."""
 PRESENT: Final = 0.01
 """Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
 order of magnitude; what just counts as found is likelier than not with any above 0.0013]."""
