@@ -41,6 +41,13 @@ def against(
         parameters: the autopilot's, as the recording has them; None: nobody has asked.
         sure: probability of an improvement that is needed.
     """
+    unknown = [
+        n
+        for n in effect.parameters
+        if parameters is not None and n not in parameters and not former(n, parameters)
+    ]
+    if unknown:  # before all that another flight may change
+        return f"{', '.join(unknown)} in force is not in the recording (old firmware has none)"
     if contradicted := [c.words for c in diagnosis.inconstant if c.effect == effect.name]:
         return contradicted[0]
     if diagnosis.verdict is not Verdict.EXPLAINED:
@@ -56,11 +63,6 @@ def against(
     odds = -2.0 * math.log(1.0 - sure)
     if not (after < before and effect.delta_bic <= -odds):
         return f"the held-out residual falls from {before:.3g} to {after:.3g} only"
-    if parameters is None:
-        return ""
-    unknown = [n for n in effect.parameters if n not in parameters and not former(n, parameters)]
-    if unknown:
-        return f"{', '.join(unknown)} in force is not in the recording"
     return ""
 
 

@@ -196,8 +196,12 @@ class Vehicle:
 
     def to_do(self, imu: int) -> str:
         """What would give an accelerometer an answer."""
-        if self._slow(imu) or not self._attitudes or not self._fixes:
+        if self._slow(imu):
             return RECORD
+        if not self._attitudes:
+            return "record the attitude as well"
+        if not self._fixes:
+            return "record GPS as well: what is felt is held against its velocity"
         if not self._placed:
             return "take off when the GPS receiver has a 3D fix, under an open sky"
         if self.refused:

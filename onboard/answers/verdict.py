@@ -15,6 +15,7 @@ from onboard.answers.words import (
     signed,
 )
 from onboard.core.diagnosis.excess import HEADING
+from onboard.core.diagnosis.limits import NOISE
 from onboard.core.diagnosis.records import REPEATED, Diagnosis, Unused, Verdict
 from onboard.core.estimate.result import Calibration
 from onboard.core.physics.catalogue import (
@@ -37,8 +38,6 @@ COLOURS = {"good": "green", "info": "cyan", "warning": "yellow", "error": "red"}
 NOT_ONE = "These recordings are not one flight"
 DEAD = "The accelerometer repeated one reading in flight"
 MOST_NAMED = 2
-NOISE = 1.3
-"""Held-out residual, in units of the noise, up to which it may be called noise."""
 MOST_SPANS = 3
 WHERE_BELIEVED = " where GPS was believed"
 SAID_ABOVE = (
@@ -98,6 +97,11 @@ def verdict_of(diagnosis: Diagnosis) -> tuple[str, str]:
 def severity(diagnosis: Diagnosis) -> str:
     """``good``, ``info``, ``warning`` or ``error``."""
     return verdict_of(diagnosis)[1]
+
+
+def lacks(diagnosis: Diagnosis) -> bool:
+    """Whether what there is to say is of something missing; else it is only worth knowing."""
+    return severity(diagnosis) != "info" and diagnosis.verdict is not Verdict.CLEAN
 
 
 def dangers(diagnosis: Diagnosis) -> list[str]:

@@ -14,14 +14,14 @@ from onboard.answers import verdict
 from onboard.answers.advice import Advice
 from onboard.answers.explain import Explanation
 from onboard.answers.explain import explain as explain_recordings
-from onboard.answers.knowledge import seen
+from onboard.answers.knowledge import calibrated, seen
 from onboard.answers.words import fixed, percent
 from onboard.cli.outputs import STANDARD_OUTPUT, refuse_overwriting
 from onboard.cli.progress import reading
 from onboard.cli.replay import write_bytes, write_json, write_text
 from onboard.cli.terminal import Terminal
 from onboard.core.diagnosis.records import Diagnosis
-from onboard.core.estimate.result import SIX_NAMES
+from onboard.core.estimate.result import SIX_NAMES, Status
 from onboard.core.physics.catalogue import title_of
 from onboard.core.physics.finding import Finding
 from onboard.report.mcap import mcap
@@ -122,7 +122,7 @@ def _answers(d: Diagnosis, advice: Advice | None) -> Table:
         found += verdict.missing(d)[len(d.effects) :]
     rows = [
         ("Danger", verdict.dangers(d)),
-        ("To know" if verdict.severity(d) == "info" else "Missing", found),
+        ("Missing" if verdict.lacks(d) else "To know", found),
         ("Proof", [verdict.proof(d)]),
         (to_do, verdict.cures(d, advice)),
         ("Note", verdict.remarks(d)),
@@ -162,7 +162,8 @@ def _limits(d: Diagnosis) -> Iterator[RenderableType]:
 def _six(d: Diagnosis) -> Table:
     c = d.calibration
     table = Table(box=None, padding=(0, 1), show_edge=False)
-    headings = (f"calibration: {c.status.value}", "in force", "estimate", "sigma", "seen")
+    status = calibrated(c) if c.status is Status.CALIBRATED else c.status.value
+    headings = (f"calibration: {status}", "in force", "estimate", "sigma", "seen")
     for heading in headings:
         table.add_column(heading, justify="left" if heading is headings[0] else "right")
     rows = zip(

@@ -212,6 +212,7 @@ def _verdict(diagnosis: Diagnosis) -> dict[str, Any]:
         "headline": verdict.headline(diagnosis),
         "severity": verdict.severity(diagnosis),
         "dangers": verdict.dangers(diagnosis),
+        "lacks": verdict.lacks(diagnosis),
         "missing": verdict.missing(diagnosis),
         "sure": verdict.proof(diagnosis),
     }

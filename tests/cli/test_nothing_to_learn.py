@@ -54,8 +54,8 @@ def begun(seconds: float) -> Callable[[list[Stamped]], Iterable[Stamped]]:
 
 
 CUT = {
-    "no attitude": (without("ATTITUDE"), "no attitude", "with attitude and GPS"),
-    "no GPS": (without(*GPS), "no GPS", "with attitude and GPS"),
+    "no attitude": (without("ATTITUDE"), "no attitude", "record the attitude as well"),
+    "no GPS": (without(*GPS), "no GPS", "record GPS as well"),
     "no fix": (changed("GPS_RAW_INT", fix_type=1), "no fix of the GPS receiver", "a 3D fix"),
     "three satellites": (
         changed("GPS_RAW_INT", satellites_visible=3),
@@ -128,7 +128,7 @@ def test_match_ends_with_one_line_that_says_it(cut, capsys):
     assert err.count("\n") == 1
     if lacks.startswith("no "):  # what is flight, and what ground, is match's own finding
         assert lacks in err
-        assert err.rstrip().endswith((to_do, ", and fly again", "and GPS", "under an open sky"))
+        assert to_do in err
 
 
 def test_one_trusted_fix_is_enough_not_to_blame_the_receiver(flight, tmp_path, capsys):

@@ -113,6 +113,15 @@ def test_parameters_that_the_recording_lacks_are_said_to_be_assumed_and_nothing_
     assert "GPS1_DELAY_MS in force is not in the recording" in text
 
 
+def test_a_parameter_that_the_autopilot_lacks_is_not_put_off_to_a_better_flight():
+    made = diagnosis(verdict=Verdict.PARTLY_EXPLAINED)
+    (why,) = [s for s in cures(made, advice_on(made, {"GPS_TYPE": 1.0})) if "Do not set" in s]
+    assert why == (
+        "Do not set GPS1_DELAY_MS = 210 yet: "
+        "GPS1_DELAY_MS in force is not in the recording (old firmware has none)."
+    )
+
+
 def test_a_trim_is_not_set_from_a_flight_that_does_not_calibrate_the_accelerometer():
     shy = calibration(status=Status.INSUFFICIENT)
     text = written(diagnosis(effects=(TILT,), calibration=shy))

@@ -38,7 +38,8 @@ class Cleared:
     ``clipped`` if the accelerometer clipped nearly all the time, and nothing was left out;
     ``sampled`` is the flight before anything was expected of its samples.  ``heard`` is what is
     believed of it although the autopilot's filter gave its receiver up, ``at_odds`` where that is
-    far from the accelerometer in any model.
+    far from the accelerometer in any model.  ``blows`` is where the samples may have missed one,
+    s since the first sample; it is left out.
     """
 
     full: Examination
@@ -52,6 +53,7 @@ class Cleared:
     sampled: Sequence[Batch]
     heard: tuple[Refused, ...] = ()
     at_odds: tuple[Unused, ...] = ()
+    blows: tuple[tuple[float, float], ...] = ()
 
     @property
     def as_sampled(self) -> tuple[Batch, ...]:
@@ -102,9 +104,15 @@ def cleared(
         full, batches, spikes = _without_spikes(asked, batches, full)
     sampled, batches = batches, full.batches
     fault: Finding | None = None
+    blows: tuple[tuple[float, float], ...] = ()
     if not clipped:
         # Of an accelerometer that clips all the time, nobody can say whether a fix is true.
-        fault = false_fixes(calibrator, engine, full, origin.t0)
+        fault, blows = false_fixes(calibrator, engine, full, origin.t0)
+    left = unclipped(sampled, blows, origin.t0) if blows else []
+    if sum(batch.trusted_s for batch in left) >= WORTH_S:
+        sampled, full = left, felt(asked, left)
+    else:
+        blows = ()
     if fault is not None:
         believed, false = misled(unbelieved(full, full.batches, fault, origin.t0), fault, origin.t0)
         full = Examination(
@@ -117,7 +125,7 @@ def cleared(
         ).with_noise()
     full.let_epochs_go()
     said = None if coarse is None else coarse.finding
-    return Cleared(full, testable, absent, rail, fault, spikes, said, clipped, sampled)
+    return Cleared(full, testable, absent, rail, fault, spikes, said, clipped, sampled, blows=blows)
 
 
 def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch] | None:

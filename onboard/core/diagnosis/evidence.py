@@ -16,7 +16,7 @@ from onboard.core.diagnosis.final_model import FinalModel
 from onboard.core.diagnosis.findings import Findings
 from onboard.core.diagnosis.flight_constants import inconstant
 from onboard.core.diagnosis.hypotheses import Choice, of_others
-from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM
+from onboard.core.diagnosis.limits import CLEARLY, FALSE_ALARM, NOISE
 from onboard.core.diagnosis.nuisance_effects import (
     constant_unknowns,
     nuisance_kinds,
@@ -81,6 +81,7 @@ class Evidence:
     clipped: bool = False
     heard: tuple[Refused, ...] = ()
     at_odds: tuple[Unused, ...] = ()
+    blows: tuple[tuple[float, float], ...] = ()
 
 
 class Judge:
@@ -126,7 +127,8 @@ class Judge:
         others = of_others(self.choice, self.final.origin.t0, claimed)
         open_ = in_words(self.undecided, SixParameters(c.scale, c.offset), claimed)
         right = _right_all_the_same(self.evidence.heard, self.final.origin.t0)
-        note = " ".join(x for x in (note, right, open_, others, trim) if x)
+        struck = _struck(self.evidence.blows)
+        note = " ".join(x for x in (note, struck, right, open_, others, trim) if x)
         if verdict is Verdict.INSUFFICIENT:
             effects = []
         effects.sort(key=lambda e: -e.share_of_mismatch)
@@ -212,7 +214,8 @@ class Judge:
                 "the two is false. " + note
             )
         note = " ".join([*(f"{c.words}; nothing of it is set." for c in changing), note])
-        left = self.final.solution.contradicts
+        # A model that is said to explain a flight predicts what it has not seen of it.
+        left = self.final.solution.contradicts or mismatch.held_out_after > NOISE
         named = [e for e in effects if (kind := kind_of(e.name)) is not None and kind.named]
         if len(named) < len(effects):
             return Verdict.PARTLY_EXPLAINED if named else Verdict.UNEXPLAINED, (
@@ -331,6 +334,17 @@ def _right_all_the_same(heard: Sequence[Refused], t0: float) -> str:
         return ""
     when = ", ".join(f"{r.start - t0:.0f} to {r.end - t0:.0f} s" for r in heard)
     return f"fixes that the autopilot's filter complained of ({when}) fit, and are used."
+
+
+def _struck(blows: Sequence[tuple[float, float]]) -> str:
+    """That the vehicle was struck, and what became of it."""
+    if not blows:
+        return ""
+    when = ", ".join(f"{0.5 * (a + b):.0f} s" for a, b in blows)
+    return (
+        f"the velocity jumps where vibration does (at {when}), as it does when a vehicle is struck "
+        "and its samples miss how hard, and that is left out."
+    )
 
 
 def _not_compared(unused: Sequence[Unused]) -> tuple[Unused, ...]:

@@ -46,6 +46,15 @@ class VelocityJumps:
             chosen.append(best)
         return sorted(chosen)
 
+    def sizes(self, chosen: Sequence[int]) -> list[float]:
+        """By how much the error jumps at the begin of some tiles, m/s."""
+        if not chosen:
+            return []
+        index = _index(chosen)
+        jumps = np.linalg.solve(self._N[np.ix_(index, index)], self._b.reshape(-1)[index])
+        out: list[float] = np.linalg.norm(jumps.reshape(-1, D), axis=1).tolist()
+        return out
+
     def gain(self, chosen: Sequence[int]) -> Array:
         """(K,) fall of chi-square by a jump at the begin of each tile beside those chosen."""
         b, every = self._b, np.arange(self._K)

@@ -38,6 +38,8 @@ MATTERS_OFFSET: Final = 0.02
 """Move of an offset that is worth an effect, m/s^2 [use]."""
 MATTERS_HELD_OUT: Final = 0.03
 """Fall of the held-out residual that is worth an effect [use]."""
+NOISE: Final = 1.3
+"""Held-out residual, in units of the noise, up to which it may be called noise [use]."""
 PRESENT: Final = 0.01
 """Share of vehicles that have an effect of the catalogue, to a size that matters [probability: the
 order of magnitude; what just counts as found is likelier than not with any above 0.0013]."""
@@ -89,6 +91,12 @@ come into sight and go as a vehicle turns, in seconds]."""
 SAME_FIX_S: Final = 0.1
 """s within which a stamp of the trust window and one of a batch are the same fix: the jitter of
 stamps [physics]."""
+VIBRATION_HZ: Final = 2.0
+"""Of the low-pass behind which ArduPilot reports vibration
+(AP_INERTIAL_SENSOR_ACCEL_VIBE_FILT_HZ) [data sheet]."""
+ORDINARY_RISE: Final = 0.99
+"""Quantile of the rises of vibration from report to report that are no blow: of the five about a
+moment one is beyond it by chance once in twenty times [probability]."""
 ANTENNA_FLOOR_M: Final = 0.01
 """m; sigma of the antenna's place in each of several recordings beside what their sums say: a
 receiver's phase centre moves by as much with the satellites that it sees [data sheet]."""

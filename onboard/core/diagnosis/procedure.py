@@ -114,6 +114,7 @@ def examine(
             sampled=clear.as_sampled,
             clipped=clear.clipped,
             heard=clear.heard,
+            blows=clear.blows,
             at_odds=clear.at_odds,
         ),
         origin,

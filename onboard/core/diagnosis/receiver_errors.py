@@ -5,19 +5,23 @@ So moments at which it jumps are looked for first, among the fixes that are no c
 before them.  Between two of them the receiver is right, or off by one error; or by one that has
 crept in until the second.  No gate is asked, for a filter gets used to what is false for long.
 
+Inertia jumps where a vehicle is struck and the samples miss it.  Where that may be, a jump is the
+receiver's only if it jumps back elsewhere.
+
 That velocities are off each by something else has its own price, and gates that refuse them.  So an
 error is one that lasts, and explains more than chance where the receiver is as noisy as there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import log
 
 import numpy as np
 
+from onboard.core.diagnosis.blows import Blows
 from onboard.core.diagnosis.effort import (
     CREEPS_S,
     FORGOTTEN_S,
@@ -77,6 +81,8 @@ class Looking:
         self._full, self._batches, self._noise = full, batches, noise
         self._variance = Fitter(full.all_blocks, full.model, full.absent).pool.variance
         self._fixes = np.unique(np.concatenate([full.point.true_time(b.fixes.t) for b in batches]))
+        self._blows, self._struck = Blows(batches), frozenset[float]()
+        self._apart = float(np.median(np.diff(self._fixes)))
         # It may begin and end at any fix.
         self._chance = needed(D, 0.5 * len(self._fixes) ** 2, self._variance)
 
@@ -85,6 +91,7 @@ class Looking:
         found: tuple[Stretch, ...] = ()
         left = self._left(found)
         for _ in range(FURTHEST):
+            self._struck = frozenset()
             moments = left.surprising[:MOST_EDGES]
             seen = self._between(self._jumps(moments, found)) if moments else ()
             if {x.tile for x in seen} <= {x.tile for x in found}:
@@ -96,8 +103,16 @@ class Looking:
         # What it is unsure by, and what a good receiver errs by now and then, is no error to tell.
         return tuple(x for x in told if x.size**2 > needed(1) * (x.sigma**2 + RECEIVER_M_S**2))
 
-    def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> list[float]:
-        """When velocities jump, s: a tile for each fix about some moments, the flight between."""
+    @property
+    def blows(self) -> tuple[tuple[float, float], ...]:
+        """From when to when (s) jumps are that :meth:`errors` has met, and that may be a blow."""
+        return tuple((t - self._apart, t + self._apart) for t in sorted(self._struck))
+
+    def _jumps(self, moments: Sequence[float], known: Sequence[Stretch]) -> dict[float, float]:
+        """When velocities jump, s, and by how much, m/s, in order of time.
+
+        There is a tile for each fix about some moments, and for the flight between.
+        """
         fixes = self._fixes
         between = np.concatenate(
             [[fixes[0] - 1.0], 0.5 * (fixes[1:] + fixes[:-1]), [fixes[-1] + 1.0]]
@@ -108,11 +123,12 @@ class Looking:
         edges = between[every[(every >= 0) & (every <= len(fixes))]]
         tiles = [Tile(a, b) for a, b in pairwise(edges.tolist())]
         about = _sum_at(0.5 * (edges[1:] + edges[:-1]), known)
-        found: list[float] = edges[VelocityJumps(self._tiled(tiles, about)).found()].tolist()
-        return found
+        jumps = VelocityJumps(self._tiled(tiles, about))
+        found = jumps.found()
+        return dict(zip(edges[found].tolist(), jumps.sizes(found), strict=True))
 
-    def _between(self, jumps: Sequence[float]) -> tuple[Stretch, ...]:
-        """Errors that begin and end where velocities jump, s.
+    def _between(self, jumps: Mapping[float, float]) -> tuple[Stretch, ...]:
+        """Errors that begin and end where velocities jump, s, by so much, m/s.
 
         Where a jump has no partner, one crept in until then, or is there when the flight begins or
         ends, if that is near enough to be remembered.
@@ -120,8 +136,11 @@ class Looking:
         # While the ground may be touched, it may be a shock that a velocity jumps by.
         first, last = self._fixes[0] + CONTACT_S, self._fixes[-1] - CONTACT_S
         aloft = {t for t in jumps if first < t < last}
+        struck = {t for t in aloft if jumps[t] <= self._blows.near(t, self._apart)}
+        aloft -= struck
         closed = self._chosen([Tile(a, b) for a, b in pairwise(jumps) if a in aloft or b in aloft])
         ends = {t for x in closed for t in (x.tile.begin, x.tile.end)}
+        self._struck = frozenset(struck - ends)
         begins, stops = float(self._fixes[0]) - 1.0, float(self._fixes[-1]) + 1.0
         alone = sorted(aloft - ends)
         others = [

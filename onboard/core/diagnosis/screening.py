@@ -80,8 +80,8 @@ def doubted_of(calibrator: Calibrator, full: Examination) -> list[Refused]:
 
 def false_fixes(
     calibrator: Calibrator, like: Engine, full: Examination, t0: float
-) -> Finding | None:
-    """GPS velocities that cannot be true.
+) -> tuple[Finding | None, tuple[tuple[float, float], ...]]:
+    """GPS velocities that cannot be true, and where a blow may have been missed, s since ``t0``.
 
     Those that others doubted in flight are asked, too: that was an opinion.  Noise levels that were
     found with the false ones among the rest would let them pass: what most fixes say of the noise
@@ -92,9 +92,10 @@ def false_fixes(
     full.let_epochs_go()
     refused = (full.refused, full.refused_untuned, like.refused)
     if not (suspicious or doubted or any(by["velocity"] for by in refused)):
-        return None
-    errors = Looking(full, heard(full.batches, doubted), noise).errors()
-    return fault_effect(errors, _distrusted(calibrator, full, t0), full.batches, t0)
+        return None, ()
+    looking = Looking(full, heard(full.batches, doubted), noise)
+    fault = fault_effect(looking.errors(), _distrusted(calibrator, full, t0), full.batches, t0)
+    return fault, tuple((a - t0, b - t0) for a, b in looking.blows)
 
 
 def heard(batches: Sequence[Batch], doubted: Sequence[Refused]) -> list[Batch]:
