@@ -73,8 +73,8 @@ class Spread:
         weights = np.where(there == self.at, np.stack((self.velocity, self.place)), 0.0)
         turned = (self.R @ acceleration).reshape(n, 3 * m)
         both, many = np.empty((K, 2, 3 * m)), max(1, TOGETHER // (there.shape[1] * 3 * m))
-        for first in range(0, K, many):
-            part = slice(first, first + many)
+        for begin in range(0, K, many):
+            part = slice(begin, begin + many)
             both[part] = weights.swapaxes(0, 1)[part] @ turned[there[part]]
         back = np.swapaxes(self.R_epoch, -1, -2)[:, None] @ both.reshape(K, 2, 3, m)
         stack[:, 0:6, columns] += back.reshape(K, 6, m)
