@@ -194,6 +194,7 @@ class Examination(Engine):
         own, self.batches, self._beside = self.batches, list(batches), by
         self.once()
         self.batches, self._beside = own, None
+        self._pass.restart()  # it has a segment, whose signals are parts of those of all of it
         return self._pass.sums.member(0)
 
     def once(self, held: tuple[Array, Array] | None = None) -> None:

@@ -41,6 +41,8 @@ def with_signal(
         batches: the flight.
         name: of the signal.
         made_of: raw force (n, 3) of samples that follow on each other, to the signal (n, k).
+
+    Of samples that follow on each other in a segment, too, it has a part of the signal and no copy.
     """
     made: dict[int, Segment] = {}
     for run in runs(batches):
@@ -48,7 +50,10 @@ def with_signal(
         signal = made_of(raw)
         for s in (batch.segment for batch in run):
             # Of each segment by itself: all of a day would be looked through for each.
-            made[id(s)] = s.with_slow(s.slow | {name: (s.t, signal[np.searchsorted(t, s.t)])})
+            at = np.searchsorted(t, s.t)
+            row = at[-1] - at[0] + 1 == len(at) and bool(np.all(np.diff(at) == 1))
+            own = signal[at[0] : at[-1] + 1] if row else signal[at]
+            made[id(s)] = s.with_slow(s.slow | {name: (s.t, own)})
     return [replace(b, segment=made[id(b.segment)]) for b in batches]
 
 

@@ -176,7 +176,8 @@ def with_parts(batches: Sequence[Batch], tones: Sequence[Tone]) -> list[Batch]:
             [(i, x.axis, x.lines[k].dense(half + 1)) for i, x in enumerate(tones) if k in x.lines]
             for k in here
         ]
-        return _taken(raw, half, parts, len(tones))
+        # A ten millionth of a tone matters to nobody, columns of every sample of a flight do.
+        return _taken(raw, half, parts, len(tones), single=True)
 
     return with_signal(batches, PARTS, made_of)
 
@@ -274,7 +275,12 @@ def _stretches_in(raw: Array, half: int, first: int) -> range:
 
 
 def _taken(
-    raw: Array, half: int, parts: Sequence[Sequence[tuple[int, int, Array]]], columns: int
+    raw: Array,
+    half: int,
+    parts: Sequence[Sequence[tuple[int, int, Array]]],
+    columns: int,
+    *,
+    single: bool = False,
 ) -> Array:
     """(n, columns) shares of each stretch of samples (n, 3), faded from one to the next.
 
@@ -285,10 +291,11 @@ def _taken(
         half: of a stretch, samples.
         parts: of each stretch: the column, of which axis it is, and its share (half + 1,) by bin.
         columns: how many.
+        single: whether in single precision.
     """
     n, count = 2 * half, len(raw)
     window = np.sin(np.pi * np.arange(n) / n)[:, None] ** 2
-    out = np.zeros((count + 4 * n, columns))
+    out: Array = np.zeros((count + 4 * n, columns), dtype=np.float32 if single else np.float64)
     longer = np.pad(raw, ((n, 2 * n), (0, 0)), mode="reflect" if count > 1 else "edge")
     for j in range(-1, math.ceil(count / half)):
         here = parts[min(max(j, 0), len(parts) - 1)]

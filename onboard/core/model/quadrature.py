@@ -9,6 +9,7 @@ NED when the filter, going through the epochs, knows ``R_nb(start)``.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -26,6 +27,8 @@ as it does in the sum of the samples.  Nodes as far apart as the samples would t
 [physics; 2, 3 and 4 give the same answers to a hundredth of a sigma]."""
 SHORT_ROW = 32
 """Turns that are multiplied one after the other, where numpy does it [cost]."""
+TOGETHER = 1024
+"""Nodes that are worked out in one go, with dozens of numbers each on the way [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,15 +106,26 @@ class Intervals:
     def integrate(self, x_b: Array, one: Array, two: Array) -> None:
         """Write :meth:`integrals` into two arrays (K, 3, m), of any layout."""
         loops = compiled_loops()
-        K, nodes, _, m = x_b.shape
         if loops is not None:
             loops.integrals(self.P, self.weight, self.weight_to_end, plain(x_b), one, two)
             return
+        for some in self._parts():
+            self._integrate(some, x_b[some], one[some], two[some])
+
+    def _integrate(self, some: slice, x_b: Array, one: Array, two: Array) -> None:
+        """The same of some of the intervals: (k, M + 1, 3, m), into (k, 3, m)."""
+        k, nodes, _, m = x_b.shape
         # Nodes and axes as one dimension that is summed over: what is turned is never stored.
-        both_weights = np.stack((self.weight, self.weight_to_end), axis=1)
-        turn = both_weights[:, :, None, :, None] * self.P.transpose(0, 2, 1, 3)[:, None]
-        both: Array = turn.reshape(K, 6, 3 * nodes) @ x_b.reshape(K, 3 * nodes, m)
+        weights = np.stack((self.weight[some], self.weight_to_end[some]), axis=1)
+        turn = weights[:, :, None, :, None] * self.P[some].transpose(0, 2, 1, 3)[:, None]
+        both = turn.reshape(k, 6, 3 * nodes) @ x_b.reshape(k, 3 * nodes, m)
         one[:], two[:] = both[:, :3], both[:, 3:]
+
+    def _parts(self) -> Iterator[slice]:
+        """Intervals that are worked out together: of a segment they would be megabytes."""
+        K, nodes = self.weight.shape
+        some = max(1, TOGETHER // nodes)
+        return (slice(first, first + some) for first in range(0, K, some))
 
     def of_sensors(self) -> OfSensors:
         """Integrals of what is in every model, at once."""
@@ -122,10 +136,14 @@ class Intervals:
             weights = self.weight, self.weight_to_end
             loops.own(self.P, *weights, s.w_b, s.raw_s, s.f_b, plain(s.R_bs), out)
             return OfSensors(out, s.R_bs)
-        axes, turned = np.broadcast_to(np.eye(3), self.P.shape), cross(s.w_b, s.f_b)
-        raw, rate = s.R_bs * s.raw_s[..., None, :], np.eye(3) * s.w_b[..., None, :]
-        x = [s.f_b[..., None], axes, raw, turned[..., None], rate]
-        return OfSensors(np.stack(self.integrals(np.concatenate(x, axis=-1)), axis=1), s.R_bs)
+        out = np.empty((K, 2, 3, 11))
+        for some in self._parts():
+            f_b, raw_s, w_b, P = s.f_b[some], s.raw_s[some], s.w_b[some], self.P[some]
+            axes, turned = np.broadcast_to(np.eye(3), P.shape), cross(w_b, f_b)
+            raw, rate = s.R_bs * raw_s[..., None, :], np.eye(3) * w_b[..., None, :]
+            x = [f_b[..., None], axes, raw, turned[..., None], rate]
+            self._integrate(some, np.concatenate(x, axis=-1), out[some, 0], out[some, 1])
+        return OfSensors(out, s.R_bs)
 
 
 class OfSensors(NamedTuple):
@@ -208,7 +226,19 @@ def turns_in_a_row(w_b: Array, h: Array) -> Array:
     Returns:
         (K, M + 1, 3, 3) body axes at the node to those at the first.
     """
-    return _chain(rotation_from_vector(rotation_increments(w_b, h)))
+    return _chain(_turns(w_b, h))
+
+
+def _turns(w_b: Array, h: Array) -> Array:
+    """(K, M, 3, 3) from node to node."""
+    K, M = len(w_b), w_b.shape[1] // 2
+    if K * M <= TOGETHER:
+        return rotation_from_vector(rotation_increments(w_b, h))
+    out, some = np.empty((K, M, 3, 3)), max(1, TOGETHER // K)
+    for first in range(0, M, some):
+        rates = w_b[:, 2 * first : 2 * (first + some) + 1]
+        out[:, first : first + some] = rotation_from_vector(rotation_increments(rates, h))
+    return out
 
 
 def _chain(turns: Array) -> Array:
@@ -217,12 +247,17 @@ def _chain(turns: Array) -> Array:
     if M > SHORT_ROW and K * K < M:
         # A long row in pieces that are as many as they are long, side by side.
         long = math.isqrt(M - 1) + 1
-        pieces = np.zeros((K, -(-M // long) * long, 3, 3)) + np.eye(3)
-        pieces[:, :M] = turns
-        own = _chain(pieces.reshape(-1, long, 3, 3)).reshape(K, -1, long + 1, 3, 3)
+        count = -(-M // long)
+        pieces = np.empty((K, count * long, 3, 3))
+        pieces[:, :M], pieces[:, M:] = turns, np.eye(3)
+        del turns  # of a segment there are thousands: two of these are there at a time
+        own = _chain(pieces.reshape(-1, long, 3, 3)).reshape(K, count, long + 1, 3, 3)
+        del pieces
         begun = _chain(own[:, :, -1])
-        whole = (begun[:, :-1, None] @ own[:, :, :-1]).reshape(K, -1, 3, 3)
-        return np.concatenate([whole, begun[:, -1:]], axis=1)[:, : M + 1]
+        made = np.empty((K, count + 1, long, 3, 3))
+        np.matmul(begun[:, :-1, None], own[:, :, :-1], out=made[:, :-1])
+        made[:, -1, 0] = begun[:, -1]
+        return made.reshape(K, -1, 3, 3)[:, : M + 1]
     P = np.empty((K, M + 1, 3, 3))
     P[:, 0] = np.eye(3)
     for i in range(M):
@@ -294,9 +329,9 @@ class NodeMaker:
             loops.inside(*self._samples, t, step, *self._felt, w, raw, f_b, P)
             return Signals(t, w, raw, f_b, self.segment, P, self.curve), P
         nodes = self.signals(t)
-        between = self.signals(t[:, :-1] + 0.5 * step[:, None])
         rates = np.empty((len(t), 2 * t.shape[1] - 1, 3))
-        rates[:, ::2], rates[:, 1::2] = nodes.w_b, between.w_b
+        rates[:, ::2] = nodes.w_b
+        rates[:, 1::2] = self.curve(t[:, :-1] + 0.5 * step[:, None])[..., :3] - self._bias
         P = turns_in_a_row(rates, step)
         return replace(nodes, P=P), P
 

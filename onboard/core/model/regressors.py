@@ -391,4 +391,5 @@ class _Accelerations:
         """Add what a receiver makes of all of them, at once."""
         if self._seen and self._spread is not None:
             there = np.concatenate(self._seen, axis=-1)
+            self._seen.clear()
             self._spread.add(there, np.array(self._columns), self._body)

@@ -26,6 +26,9 @@ from onboard.core.model.smoothing import SPREAD, between_two, weight_of_two
 
 TAIL = 12.0
 """Time constants after which nothing is left of a lag: 6e-6 [cost]."""
+TOGETHER = 2**15
+"""Numbers about some epochs that are looked up in one go: about all of a segment's they are
+megabytes [cost]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,10 @@ class Spread:
         there = np.clip(self.at, 0, n - 1)
         weights = np.where(there == self.at, np.stack((self.velocity, self.place)), 0.0)
         turned = (self.R @ acceleration).reshape(n, 3 * m)
-        both = weights.swapaxes(0, 1) @ turned[there]
+        both, many = np.empty((K, 2, 3 * m)), max(1, TOGETHER // (there.shape[1] * 3 * m))
+        for begin in range(0, K, many):
+            part = slice(begin, begin + many)
+            both[part] = weights.swapaxes(0, 1)[part] @ turned[there[part]]
         back = np.swapaxes(self.R_epoch, -1, -2)[:, None] @ both.reshape(K, 2, 3, m)
         stack[:, 0:6, columns] += back.reshape(K, 6, m)
 
