@@ -106,6 +106,7 @@ class Streams:
         self.writing: Callable[[], bool] = lambda: False
         """Whether parameters are being written to a vehicle that stands."""
         self._fewer: list[Stream] = []
+        self._owed: dict[int, int] = {}
         self._target: tuple[int, int] | None = None
         self._current: Stream | None = None
         self._rung = 0
@@ -123,9 +124,23 @@ class Streams:
         measured = (stream.request.name for stream in self._streams.values())
         return tuple(dict.fromkeys(("COMMAND_ACK", "PARAM_VALUE", *measured, BODY_ATTITUDE)))
 
+    @property
+    def owes(self) -> bool:
+        """Whether what was made to come seldom has not been granted as before since."""
+        return not self._streams.keys().isdisjoint(self._owed)
+
+    def parting(self) -> Sequence[Message]:
+        """That again, all at once: for who has no time to wait for answers."""
+        return [
+            self._command(number, 1e3 * interval_ms)
+            for number, interval_ms in self._owed.items()
+            if number in self._streams
+        ]
+
     def start(self, system: int, component: int, now: float) -> None:
         """Begin with this autopilot; again after a reboot, for intervals do not outlive one."""
         if self._target != (system, component):
+            self._owed.clear()
             self._views.forget()
             self._follow_views(now)
             for stream in self._streams.values():
@@ -223,6 +238,7 @@ class Streams:
             for stream in self._streams.values()
             if stream.granted_ms is not None and stream.granted_ms < limits.SELDOM_MS
         ]
+        self._owed |= {s.number: s.granted_ms or s.request.interval_ms for s in self._fewer}
         return [self._command(s.number, 1e3 * limits.SELDOM_MS) for s in self._fewer]
 
     def _as_before(self, now: float) -> None:
@@ -250,6 +266,7 @@ class Streams:
             self._asked_at = now
             return
         self._current = None
+        self._owed.pop(stream.number, None)
         if self._asks > 1:
             # The earlier tries may be answered yet: let that pass before the next question.
             self._quiet_until = now + limits.ACK_TIMEOUT_S

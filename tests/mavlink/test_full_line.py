@@ -66,3 +66,27 @@ def test_who_reboots_meanwhile_is_asked_for_everything_when_it_is_written():
     w.run(20.0)
     assert w.autopilot.intervals == GRANTED
     assert StreamState.WAITING not in w.states().values()
+
+
+def test_who_takes_leave_is_told_what_is_owed_and_gives_it_back():
+    w = world(REQUESTS, Narrow(60.0))
+    w.run(20.0)
+    assert not w.streams.owes
+    writing(w, 2.0)
+    assert w.streams.owes
+    w.exchange(w.streams.parting())  # nobody waits for answers
+    assert w.autopilot.intervals == GRANTED
+    w.run(5.0)
+    assert not w.streams.owes
+    assert w.streams.parting() == []
+
+
+def test_what_is_owed_is_so_until_it_was_granted():
+    w = world(REQUESTS, Narrow(60.0))
+    w.run(20.0)
+    writing(w, 2.0)
+    w.streams.start(1, 1, w.now)  # it was silent for a while, and has not rebooted
+    assert w.streams.owes
+    w.run(20.0)
+    assert not w.streams.owes
+    assert w.autopilot.intervals == GRANTED

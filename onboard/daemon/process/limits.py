@@ -21,6 +21,9 @@ start itself]."""
 FINISH_PUSH_S: Final = 8.0
 """s that a transaction under way gets at shutdown; then it stays open, to be resumed [service:
 with SAVE_S and the broker's farewell inside TimeoutStopSec]."""
+RATES_BACK_S: Final = 4.0
+"""s at shutdown to have samples come as often as before a push: a second of silence, then some
+eight questions, each with its answer [service: as before]."""
 SAVE_S: Final = 5.0
 """s that the learner gets at shutdown for what has come and its last save [service: as before]."""
 STALL_S: Final = 0.05
