@@ -125,6 +125,11 @@ class Duties:
         if not self._ledger.condemned or self._ledger.trouble:
             return None
         imu, planned = next(iter(self._ledger.condemned.items()))
+        if planned.plan.no_way_back:
+            sentence = f"not taken back: before it was {planned.plan.no_way_back}"
+            self.judge([Watched(planned.transaction, Verdict.SUPERSEDED, sentence)])
+            self._ledger.condemned.pop(imu)
+            return None
         return planned if now >= self._proposals.standing(imu).not_before else None
 
     @property
@@ -139,7 +144,7 @@ class Duties:
             other = outcome.result is Result.OTHER_VEHICLE
             pause_ends = self._proposals.standing(imu).not_before
             # While its end cannot be written down, it would be taken up for ever.
-            waits = other or bool(self._ledger.trouble)
+            waits = other or bool(self._ledger.trouble) or outcome.reason is Reason.NO_WAY_BACK
             self.not_before[outcome.transaction] = math.inf if waits else pause_ends
         if outcome.result is Result.COMPLETED:
             self.aftercare.wrote(imu, outcome.transaction)

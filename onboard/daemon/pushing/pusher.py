@@ -241,6 +241,9 @@ class Pusher:
         if against:
             raise RefusedError(against)
         imu = chosen[0]
+        pushed = mixed[imu] if imu in mixed else in_force[imu]
+        if pushed.plan.no_way_back:
+            raise RefusedError(f"before the push was {pushed.plan.no_way_back}: not written back")
         if imu in mixed:
             self._resume(mixed[imu], now)
         else:

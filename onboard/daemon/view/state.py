@@ -59,6 +59,7 @@ TO_DO: Final[Mapping[str, str]] = MappingProxyType(
         "temperature_learning": "let the autopilot finish its temperature calibration",
         "temperature_reference_unknown": "calibrate the accelerometers on the bench once",
         "out_of_bounds": "calibrate on the bench, and check how the autopilot is mounted",
+        "no_way_back": "set it to what it was, or calibrate on the bench",
         "kept_value_contradicted": "run onboard explain on the recording",
         "unconfirmed": FLY_AGAIN,
         "not_sure": FLY_AGAIN,
