@@ -241,13 +241,13 @@ class Pusher:
         if against:
             raise RefusedError(against)
         imu = chosen[0]
-        pushed = mixed[imu] if imu in mixed else in_force[imu]
-        if pushed.plan.no_way_back:
-            raise RefusedError(f"before the push was {pushed.plan.no_way_back}: not written back")
+        plan = in_force[imu].plan
+        if plan.no_way_back:
+            raise RefusedError(f"before the push was {plan.no_way_back}: not written back")
         if imu in mixed:
             self._resume(mixed[imu], now)
         else:
-            self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
+            self._begin(plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
 
     def view(self) -> PushView:
