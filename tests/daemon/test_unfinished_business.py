@@ -75,7 +75,7 @@ async def test_a_resumption_that_fails_is_tried_again_after_a_pause(document, da
         vehicle.mute_after_sets = 0  # it can be read, but takes no writes
         async with daemon(document) as service:
             await until(lambda: notices(service, "push_interrupted"))
-            await ticks(service, 20)
+            await ticks(service, 10)
             assert service.snapshot().counters["resumed"] == 1
             vehicle.mute_after_sets = None
             service.parts.pusher._duties.not_before.clear()  # the pause is over

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
+from onboard.daemon.pushing import limits
 from onboard.daemon.pushing.aftercare import Aftercare
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.view.notices import Notices
+from onboard.daemon.view.unfinished import Unfinished
 from onboard.push.entries import Planned, Recovery, Result, Verdict, Watched
 from onboard.push.policy import Mode, VehicleCondition, moment
 from onboard.push.signals import Outcome, Reason
@@ -32,6 +35,8 @@ class Duties:
         self.not_before: dict[str, float] = {}
         """End of the pause of an open transaction, by its identifier."""
         self.aftercare = Aftercare(ledger, notices)
+        self._waits: dict[str, str] = {}
+        self._tries: Counter[str] = Counter()
         self._ledger = ledger
         self._proposals = proposals
         self._witness = witness
@@ -49,6 +54,13 @@ class Duties:
     def _open(self) -> bool:
         return any(self.not_before.get(r.transaction) != math.inf for r in self._ledger.open)
 
+    def not_ended(self) -> list[Unfinished]:
+        """What of the vehicle that is there is to be taken up, or waits for a person."""
+        mine = [r for r in self._ledger.open if self._ledger.is_here(r.plan)]
+        found = [Unfinished(recovery=r, waits=self._waits.get(r.transaction, "")) for r in mine]
+        found += [Unfinished(recovery=r) for r in self.aftercare.lost.values()]
+        return found + [Unfinished(recovery=r, asks=True) for r in self.aftercare.mixed.values()]
+
     def mended(self) -> None:
         """The disk takes the journal again: what waited for that waits no longer."""
         self.not_before.clear()
@@ -56,6 +68,7 @@ class Duties:
     def begin(self) -> None:
         """An autopilot is there (again): pauses are over, and pushes have to show."""
         self.not_before.clear()
+        self._tries.clear()
         self.aftercare.begin()
 
     def read(self, *, busy: bool, in_flight_since: float | None) -> None:
@@ -137,15 +150,20 @@ class Duties:
         """Whether a push in force has to be taken back."""
         return bool(self._ledger.condemned)
 
-    def ended(self, outcome: Outcome) -> None:
+    def ended(self, outcome: Outcome, now: float) -> None:
         """What the end of a transaction leaves to be done."""
         imu = outcome.plan.imu
         if outcome.open:  # once more after a pause; of another vehicle when one turns up anew
             other = outcome.result is Result.OTHER_VEHICLE
-            pause_ends = self._proposals.standing(imu).not_before
+            tries = self._tries[outcome.transaction]
+            self._tries[outcome.transaction] += 1
+            pauses = limits.RESUMED_AFTER_S
+            pause_ends = now + pauses[min(tries, len(pauses) - 1)]
             # While its end cannot be written down, it would be taken up for ever.
-            waits = other or bool(self._ledger.trouble) or outcome.reason is Reason.NO_WAY_BACK
+            for_good = other or outcome.reason is Reason.NO_WAY_BACK
+            waits = for_good or bool(self._ledger.trouble)
             self.not_before[outcome.transaction] = math.inf if waits else pause_ends
+            self._waits[outcome.transaction] = outcome.sentence if for_good else ""
         if outcome.result is Result.COMPLETED:
             self.aftercare.wrote(imu, outcome.transaction)
         condemned = self._ledger.condemned.get(imu)

@@ -26,6 +26,7 @@ from onboard.push.entries import (
     remains,
 )
 from onboard.push.journal import Journal
+from onboard.push.plan import PushPlan
 from onboard.push.signals import JournalFailed, JournalWritten
 
 logger = logging.getLogger(__name__)
@@ -118,10 +119,13 @@ class Ledger:
 
     def _here(self, planned: Planned | None) -> Planned | None:
         """It, if it was written to the board that is there."""
-        if planned is None or self.system_id is None:
-            return planned
-        here = planned.plan.vehicle.same_airframe(self.system_id, self.board)
-        return planned if here else None
+        return planned if planned is not None and self.is_here(planned.plan) else None
+
+    def is_here(self, plan: PushPlan) -> bool:
+        """Whether a plan is for the board that is there, as far as is known."""
+        if self.system_id is None:
+            return True
+        return plan.vehicle.same_airframe(self.system_id, self.board)
 
     def left(self) -> dict[int, Planned]:
         """What was written last to each accelerometer, a push or the way back, and is still ours.

@@ -7,7 +7,13 @@ from collections.abc import Collection, Mapping
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.people import approvable
 from onboard.daemon.pushing.proposals import Proposals
-from onboard.daemon.view.snapshot import ChangeView, JudgedView, ProposalView, PushView
+from onboard.daemon.view.snapshot import (
+    ChangeView,
+    JudgedView,
+    ProposalView,
+    PushView,
+    UnfinishedView,
+)
 from onboard.daemon.view.state import WAITING
 from onboard.daemon.view.written import written_view
 from onboard.push.entries import Planned, Purpose
@@ -25,6 +31,7 @@ def push_view(
     in_force: Mapping[int, Planned],
     lost: Collection[int] = (),
     mixed: Collection[int] = (),
+    unfinished: tuple[UnfinishedView, ...] = (),
 ) -> PushView:
     """What the snapshot says of pushes.
 
@@ -37,6 +44,7 @@ def push_view(
         in_force: pushes whose values the autopilot has, by accelerometer.
         lost: accelerometers whose values the autopilot had not stored: to be put back.
         mixed: accelerometers that have old and new values, nobody knows why.
+        unfinished: writes that have not come to their end.
     """
     current = proposals.current.items()
     waiting = (p.held_back.keys() for i, p in current if p.held_back and i != proposals.writing)
@@ -58,6 +66,7 @@ def push_view(
             in_force={imu: pushed.transaction for imu, pushed in in_force.items()},
             mixed=mixed,
         ),
+        unfinished=unfinished,
     )
 
 

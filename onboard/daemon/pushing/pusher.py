@@ -24,6 +24,7 @@ from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.pushing.writer import Writer
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import PushView
+from onboard.daemon.view.unfinished import unfinished_view
 from onboard.errors import RefusedError
 from onboard.mavlink.autopilot import (
     AutopilotFound,
@@ -250,9 +251,15 @@ class Pusher:
             self._begin(plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
 
-    def view(self) -> PushView:
-        """For the snapshot."""
+    def view(self, there: Mapping[str, float], condition: VehicleCondition) -> PushView:
+        """For the snapshot.
+
+        Args:
+            there: the autopilot's parameters by name, those that were read since it is there.
+            condition: the vehicle now.
+        """
         proposals, ledger = self._proposals, self._ledger
+        hindered = proposals.forbidden or ledger.trouble
         return push_view(
             proposals,
             ledger,
@@ -262,6 +269,10 @@ class Pusher:
             in_force=self._in_force(),
             lost=self._duties.aftercare.lost.keys(),
             mixed=self._duties.aftercare.mixed.keys(),
+            unfinished=tuple(
+                unfinished_view(one, there, condition, hindered=hindered)
+                for one in self._duties.not_ended()
+            ),
         )
 
     def _in_force(self) -> dict[int, Planned]:
@@ -385,5 +396,5 @@ class Pusher:
         else:
             changed = outcome.reason is Reason.CHANGED_BY_OTHER
             self._proposals.failed(imu, now, changed_by_other=changed)
-        self._duties.ended(outcome)
+        self._duties.ended(outcome, now)
         self._read_ledger()

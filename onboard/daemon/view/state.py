@@ -15,7 +15,7 @@ from typing import Final
 
 from onboard.answers.knowledge import calibrated, knowledge
 from onboard.core.estimate.result import Calibration, Status
-from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView
+from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView, UnfinishedView
 
 NAMES: Final = (
     "collecting",
@@ -27,6 +27,7 @@ NAMES: Final = (
     "writing",
     "up_to_date",
     "rejected",
+    "half_written",
 )
 """All that a state may be called."""
 AFTER_LANDING: Final = frozenset(
@@ -74,7 +75,8 @@ _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 class Circumstances:
     """What else decides: ``writing`` and ``written`` are about this accelerometer.
 
-    ``impossible``: why nothing can be proposed, where there is no proposal.
+    ``impossible``: why nothing can be proposed, where there is no proposal.  ``half``: half a set
+    is in force, or may be.
     """
 
     proposal: ProposalView | None = None
@@ -82,6 +84,7 @@ class Circumstances:
     written: bool = False
     flying: bool = False
     impossible: str = ""
+    half: UnfinishedView | None = None
 
 
 ALONE: Final = Circumstances()
@@ -97,6 +100,12 @@ def state_of(c: Calibration, now: Circumstances = ALONE) -> StateView:
     """
     if now.writing:
         return _state("writing", "being written", "its values are being written", INFO)
+    if now.half is not None:
+        half = now.half
+        title = "half a set in force" if half.half else "write interrupted"
+        return _state(
+            "half_written", title, half.sentence, ERROR if half.half else WARNING, half.next
+        )
     match c.status:
         case Status.INVALID:
             return _state("invalid", "cannot be used", c.note or "it has no valid answer", ERROR)

@@ -44,6 +44,8 @@ export class Push {
     const doing = push.state === "idle" ? "" : ` Now: ${plain(push.state)}${push.active_imu ? `, IMU ${push.active_imu}` : ""}.`;
     const last = push.last_outcome ? ` Last time: ${push.last_outcome}` : "";
     say(byId("push-state"), `Policy: ${policyInWords(push.policy)}${approval}.${doing}${last}`);
+    const unfinished = push.unfinished ?? [];
+    renew(byId("unfinished"), unfinished, () => unfinished.map(notEnded));
     const states = new Map(imus.map(({ imu, state }) => [imu, state]));
     renew(byId("proposals"), [push.proposals, [...states]], () =>
       push.proposals.length
@@ -148,6 +150,31 @@ function same(proposal, title, state) {
     h("h3", { text: title }),
     h("p", { class: "soft", text: capital(`${state.sentence}.`) }),
     h("details", { "data-key": `same-${proposal.imu}` }, h("summary", { text: "The numbers" }), changesTable(proposal.changes)),
+  );
+}
+
+// A write that has not come to its end: which values are in force, and what to do.
+function notEnded(one) {
+  const decimals = ({ name }) => (name.includes("SCAL") ? 5 : 4);
+  const which = ({ before, written, now }) => (now === null ? "not known yet" : now === written ? "new" : now === before ? "old" : "somebody's");
+  return h(
+    "div",
+    { class: "proposal", "data-imu": one.imu },
+    h("h3", { class: one.half === false ? "" : "bad", text: `IMU ${one.imu}: ${one.half ? "half a set is in force" : "a write was interrupted"}` }),
+    h("p", { text: capital(`${one.sentence}.`) }),
+    ...(one.next ? [h("p", { class: "bad", text: capital(`${one.next}.`) })] : []),
+    h("div", { class: "scroll" }, h(
+      "table",
+      { class: "changes" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Parameter" }), ...["old", "new", "in force"].map((text) => h("th", { scope: "col", class: "number", text })))),
+      h("tbody", {}, ...one.values.map((value) => h(
+        "tr",
+        {},
+        h("td", { class: "name", text: value.name }),
+        ...[value.before, value.written].map((number) => h("td", { class: "number", text: fixed(number, decimals(value)) })),
+        h("td", { class: "number to", text: value.now === null ? which(value) : `${fixed(value.now, decimals(value))} (${which(value)})` }),
+      ))),
+    )),
   );
 }
 
