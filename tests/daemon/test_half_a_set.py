@@ -50,9 +50,11 @@ async def test_who_armed_meanwhile_is_told_to_land_and_what_is_in_force(document
             await until(lambda: notices(service, "half_written"))
             assert "land and disarm" in notices(service, "half_written")[0]
             assert json.loads(service.snapshot().to_json())["push"]["unfinished"][0]["half"]
+            vehicle.landed = True  # armed on the ground: nothing is written
             await ticks(service, 20)
             assert vehicle.sets == []
-            vehicle.armed, vehicle.landed = False, True
+            assert "land and disarm" in unfinished(service).next
+            vehicle.armed = False
             await until(lambda: service.snapshot().push.state == "idle")
             assert in_force(vehicle) == before
             assert unfinished(service) is None

@@ -59,7 +59,7 @@ class Duties:
         mine = [r for r in self._ledger.open if self._ledger.is_here(r.plan)]
         found = [Unfinished(recovery=r, waits=self._waits.get(r.transaction, "")) for r in mine]
         found += [Unfinished(recovery=r) for r in self.aftercare.lost.values()]
-        return found + [Unfinished(recovery=r, asks=True) for r in self.aftercare.mixed.values()]
+        return found + [Unfinished(recovery=r, asks=True) for r in self.aftercare.asked.values()]
 
     def mended(self) -> None:
         """The disk takes the journal again: what waited for that waits no longer."""
@@ -166,6 +166,8 @@ class Duties:
             self._waits[outcome.transaction] = outcome.sentence if for_good else ""
         if outcome.result is Result.COMPLETED:
             self.aftercare.wrote(imu, outcome.transaction)
+        elif outcome.result is Result.ROLLED_BACK:
+            self.aftercare.undone(imu)
         condemned = self._ledger.condemned.get(imu)
         if condemned is not None and outcome.reason is Reason.CHANGED_BY_OTHER:
             sentence = "not taken back: somebody has changed the parameters since"

@@ -144,6 +144,10 @@ class Ledger:
         """The last push that was completed on the board that is there, rolled back or not."""
         return self._here(self._journal.last_pushed(imu))
 
+    def last_undone(self, imu: int) -> Planned | None:
+        """The last push of the board that is there, if it was rolled back before it completed."""
+        return self._here(self._journal.last_undone(imu))
+
     def all_in_force(
         self, values: Mapping[str, float], writing: int | None = None
     ) -> dict[int, Planned]:

@@ -31,6 +31,7 @@ def push_view(
     in_force: Mapping[int, Planned],
     lost: Collection[int] = (),
     mixed: Collection[int] = (),
+    asked: Collection[int] = (),
     unfinished: tuple[UnfinishedView, ...] = (),
 ) -> PushView:
     """What the snapshot says of pushes.
@@ -44,6 +45,7 @@ def push_view(
         in_force: pushes whose values the autopilot has, by accelerometer.
         lost: accelerometers whose values the autopilot had not stored: to be put back.
         mixed: accelerometers that have old and new values, nobody knows why.
+        asked: accelerometers of which a person decides: those, and writes that came late.
         unfinished: writes that have not come to their end.
     """
     current = proposals.current.items()
@@ -57,7 +59,7 @@ def push_view(
         active_imu=None if transaction is None else transaction.plan.imu,
         proposals=proposal_views(proposals),
         last_outcome=None if last is None else told(last),
-        can_roll_back=tuple(sorted(in_force.keys() | set(mixed))),
+        can_roll_back=tuple(sorted(in_force.keys() | set(asked))),
         judged=judged,
         written=written_view(
             ledger.entries,

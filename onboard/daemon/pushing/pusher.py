@@ -223,9 +223,9 @@ class Pusher:
         Raises:
             RefusedError: there is no push in force, or now is not the moment.
         """
-        in_force, mixed = self._in_force(), self._duties.aftercare.mixed
-        in_force |= {imu: pushed for imu in mixed if (pushed := self._ledger.last_pushed(imu))}
-        chosen = [imu for imu in imus or in_force if imu in in_force]
+        asked = self._duties.aftercare.asked
+        plans = {imu: written.plan for imu, written in (self._in_force() | asked).items()}
+        chosen = [imu for imu in imus or plans if imu in plans]
         if not chosen:
             raise RefusedError("no push is in force that could be rolled back")
         if len(chosen) > 1:
@@ -241,12 +241,11 @@ class Pusher:
         against = self._duties.against(self._condition)
         if against:
             raise RefusedError(against)
-        imu = chosen[0]
-        plan = in_force[imu].plan
+        imu, plan = chosen[0], plans[chosen[0]]
         if plan.no_way_back:
             raise RefusedError(f"before the push was {plan.no_way_back}: not written back")
-        if imu in mixed:
-            self._resume(mixed[imu], now)
+        if imu in asked:
+            self._resume(asked[imu], now)
         else:
             self._begin(plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
@@ -269,6 +268,7 @@ class Pusher:
             in_force=self._in_force(),
             lost=self._duties.aftercare.lost.keys(),
             mixed=self._duties.aftercare.mixed.keys(),
+            asked=self._duties.aftercare.asked.keys(),
             unfinished=tuple(
                 unfinished_view(one, there, condition, hindered=hindered)
                 for one in self._duties.not_ended()

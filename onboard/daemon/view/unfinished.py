@@ -91,7 +91,7 @@ def _listed(changes: list[Change], values: Mapping[str, float]) -> str:
 def _next(one: Unfinished, condition: VehicleCondition, hindered: str) -> str:
     """What to do about it, the vehicle first."""
     imu = one.recovery.plan.imu
-    stands = not condition.may_fly
+    stands = condition.armed is False and condition.landed is not False
     first = "do not arm" if stands or condition.armed is None else LAND
     if one.asks:
         then = f"`onboard rollback {imu}` puts the old values back"
