@@ -37,6 +37,7 @@ class Duties:
         self.aftercare = Aftercare(ledger, notices)
         self._waits: dict[str, str] = {}
         self._tries: Counter[str] = Counter()
+        self._until_right: dict[str, float] = {}
         self._ledger = ledger
         self._proposals = proposals
         self._witness = witness
@@ -69,6 +70,7 @@ class Duties:
         """An autopilot is there (again): pauses are over, and pushes have to show."""
         self.not_before.clear()
         self._tries.clear()
+        self._until_right.clear()
         self.aftercare.begin()
 
     def read(self, *, busy: bool, in_flight_since: float | None) -> None:
@@ -112,10 +114,22 @@ class Duties:
         """
         if self._open:
             return False
+        for recovery in self._ledger.open:
+            self._right_again(recovery, values)
         unasked = self._proposals.settings.mode is not Mode.NEVER and not self._proposals.approval
         known = len(self._ledger.entries)
         self.aftercare.look(values, confirmed, unasked=unasked)
         return len(self._ledger.entries) != known
+
+    def _right_again(self, recovery: Recovery, values: Mapping[str, float]) -> None:
+        """What waits for its accelerometer waits no longer once the identifier is that one's."""
+        name, pause_ends = recovery.transaction, self._until_right.get(recovery.transaction)
+        if pause_ends is None or not self._ledger.is_here(recovery.plan):
+            return
+        if values.get(recovery.plan.device_id_name) == recovery.plan.vehicle.device_id:
+            self.not_before[name] = pause_ends
+            self._waits[name] = ""
+            del self._until_right[name]
 
     def against(self, condition: VehicleCondition) -> str:
         """Objections to the way back at this moment; the policy 'never' is none."""
@@ -164,6 +178,8 @@ class Duties:
             waits = for_good or bool(self._ledger.trouble)
             self.not_before[outcome.transaction] = math.inf if waits else pause_ends
             self._waits[outcome.transaction] = outcome.sentence if for_good else ""
+            if other:
+                self._until_right[outcome.transaction] = pause_ends
         if outcome.result is Result.COMPLETED:
             self.aftercare.wrote(imu, outcome.transaction)
         elif outcome.result is Result.ROLLED_BACK:
