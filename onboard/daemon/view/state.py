@@ -56,6 +56,7 @@ FLY_AGAIN = "fly again: the next flight decides on these values"
 TO_DO: Final[Mapping[str, str]] = MappingProxyType(
     {
         "no_journal": "see to the companion's disk: it is full, read-only or failing",
+        "imu_stuck": "see to the accelerometer before the next flight",
         "doubtful": "find out who else sends, then reset what was learned",
         "temperature_learning": "let the autopilot finish its temperature calibration",
         "temperature_reference_unknown": "calibrate the accelerometers on the bench once",
@@ -196,7 +197,8 @@ def _proposed(
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
     more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
     cure = next((what for name, what in TO_DO.items() if name in lasting), "")
-    todo = further or ("approve it if that is all right" if proposal.approvable else cure)
+    asks = proposal.approvable and "imu_stuck" not in lasting
+    todo = further or ("approve it if that is all right" if asks else cure)
     title = f"{approved}but {title}" if approved else title
     return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
 

@@ -6,7 +6,7 @@ import { brief, capital, fixed, plain, policyInWords } from "./words.js";
 
 const TOKEN_KEY = "onboard token";
 const WAIT_MS = 15000;
-const DIAGNOSIS = ["physics_missing", "not_diagnosed"]; // reasons that a person lifts by saying so explicitly
+const DIAGNOSIS = ["physics_missing", "imu_stuck", "not_diagnosed"]; // reasons that a person lifts by saying so explicitly
 
 const QUESTIONS = {
   approve: (imus) => [`Write the new values for ${imus}?`, "They are written as soon as policy and flight state allow, read back, and watched in the next flight."],
