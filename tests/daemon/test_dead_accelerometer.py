@@ -20,7 +20,9 @@ async def test_it_waits_for_a_person_who_is_told_to_see_to_it(document, daemon, 
         assert "70 s" in held_back(service)["imu_stuck"]
         await asyncio.sleep(10.0)
         assert vehicle.sets == []
-        assert "see to the accelerometer" in service.snapshot().next_step.text
+        step = service.snapshot().next_step
+        assert (step.imu, step.severity) == (1, "error")
+        assert "see to the accelerometer" in step.text
         with pytest.raises(RefusedError, match="despite-diagnosis"):
             await service.approve((1,))
         await service.approve((1,), despite_diagnosis=True)

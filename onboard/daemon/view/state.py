@@ -200,7 +200,8 @@ def _proposed(
     asks = proposal.approvable and "imu_stuck" not in lasting
     todo = further or ("approve it if that is all right" if asks else cure)
     title = f"{approved}but {title}" if approved else title
-    return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
+    severity = ERROR if "imu_stuck" in lasting else WARNING
+    return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", severity, todo)
 
 
 def _missing(now: Circumstances) -> str:
