@@ -107,6 +107,8 @@ export class Push {
   /** What would be written, old and new, before it is asked for. */
   table(action, imus, proposal) {
     if (["approve", "override"].includes(action) && proposal) return [changesTable(proposal.changes)];
+    const half = action === "rollback" && (this.push.unfinished ?? []).find((one) => imus.includes(one.imu));
+    if (half) return [valuesTable(half.values, { now: this.parameters })];
     const written = action === "rollback" && (this.push.written ?? []).find((push) => push.in_force && imus.includes(push.imu));
     return written ? [valuesTable(written.values, { now: this.parameters })] : [];
   }
@@ -159,7 +161,7 @@ function notEnded(one) {
   const which = ({ before, written, now }) => (now === null ? "not known yet" : now === written ? "new" : now === before ? "old" : "somebody's");
   return h(
     "div",
-    { class: "proposal", "data-imu": one.imu },
+    { class: "unfinished", "data-imu": one.imu },
     h("h3", { class: one.half === false ? "" : "bad", text: `IMU ${one.imu}: ${one.half ? "half a set is in force" : "a write was interrupted"}` }),
     h("p", { text: capital(`${one.sentence}.`) }),
     ...(one.next ? [h("p", { class: "bad", text: capital(`${one.next}.`) })] : []),
