@@ -107,17 +107,6 @@ async def test_tightening_by_parameter_holds_and_the_same_again_is_no_news(docum
             assert vehicle.sets == []
 
 
-async def test_what_a_silence_has_interrupted_is_not_called_about_to_be_written(
-    document, daemon, port
-):
-    async with daemon(document) as service, Vehicle(port) as vehicle:
-        vehicle.when_set[3] = vehicle.stop_talking
-        vehicle.mute_after_sets = 3
-        convinced(service, WANTED)
-        await until(lambda: told(service, "push_interrupted"))
-        assert "failed_before" in held_back(service)
-
-
 async def test_what_would_never_be_written_back_is_not(document, daemon, port, monkeypatch):
     """Neither for a person nor for a flight: old values of an older version, or made up."""
     async with daemon(document) as service, Vehicle(port) as vehicle:

@@ -298,10 +298,6 @@ class Proposals:
         ]
         standing.failures += 1
         standing.not_before = now + wait
-        proposal = self.current.get(imu)
-        if proposal is not None:  # until they are made anew, which a silent autopilot may put off
-            held = {**proposal.held_back, **self._beyond_policy(imu, now)}
-            self.current[imu] = Proposal(proposal.plan, told(imu, held))
 
     def standing(self, imu: int) -> Standing:
         """What is remembered of one accelerometer."""
