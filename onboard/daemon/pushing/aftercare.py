@@ -218,7 +218,9 @@ class Aftercare:
         self._ledger.append(Replaced(written.transaction, sentence))
         self._mixed.pop(imu, None)
         self.lost.pop(imu, None)
-        self._notices.post("push_replaced", f"IMU {imu}: {sentence}: that stays")
+        half = remains(written.plan, values) is Remains.MIXED
+        told = f"{sentence}: that stays" + ("; the others are as they were written" if half else "")
+        self._notices.post("push_replaced", f"IMU {imu}: {told}", warning=half)
 
     def _not_stored(self, imu: int, written: Planned, values: Mapping[str, float]) -> None:
         """Back to the old ones, whether they were to go or to come back."""
