@@ -7,7 +7,16 @@ import pytest
 
 from onboard.daemon.mqtt.summary import summary
 from onboard.daemon.outlets.announcer import LINES
-from tests.daemon.daemons import SIX, held_back, in_force, notices, ticks, until
+from tests.daemon.daemons import (
+    SIX,
+    WANTED,
+    convinced,
+    held_back,
+    in_force,
+    notices,
+    ticks,
+    until,
+)
 from tests.daemon.standing_vehicle import Vehicle
 from tests.daemon.test_unfinished_business import crashed_in_the_middle
 
@@ -92,6 +101,22 @@ async def test_before_the_values_are_read_nobody_is_told_that_all_is_well(docume
             assert "do not arm" in unfinished(service).next
             vehicle.talk_again()
             await until(lambda: service.snapshot().push.state == "idle")
+
+
+async def test_what_was_told_before_it_was_written_is_no_news_of_it(document, daemon, port):
+    """Nothing is answered from the first write on: whether that is in force nobody knows."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        tell = vehicle._tell
+        vehicle.when_set[1] = lambda: setattr(vehicle, "_tell", lambda _: None)
+        convinced(service, WANTED)
+        await until(lambda: notices(service, "push_interrupted"))
+        (name, _), *_ = vehicle.sets
+        one = unfinished(service)
+        assert one.half is None
+        assert {v.name for v in one.values if v.now is None} == {name}
+        assert "do not arm" in service.snapshot().next_step.text
+        vehicle._tell = tell
+        await until(lambda: service.snapshot().push.state == "idle")
 
 
 def test_a_ground_station_hears_of_it_as_of_nothing_graver():

@@ -72,7 +72,7 @@ class Portrait:
     def _push(self, condition: VehicleCondition) -> PushView:
         known = self.parts.parameters
         there = {name: known.values[name] for name in known.confirmed}
-        return self.parts.pusher.view(there, condition)
+        return self.parts.pusher.view(there, known.heard, condition)
 
     def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
         """What is known of each accelerometer."""

@@ -13,7 +13,8 @@ from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.proposals import Proposals
 from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.view.notices import Notices
-from onboard.daemon.view.unfinished import Unfinished
+from onboard.daemon.view.snapshot import UnfinishedView
+from onboard.daemon.view.unfinished import Unfinished, unfinished_view
 from onboard.push.entries import Planned, Recovery, Result, Verdict, Watched
 from onboard.push.policy import Mode, VehicleCondition, moment
 from onboard.push.signals import Outcome, Reason
@@ -38,6 +39,7 @@ class Duties:
         self._waits: dict[str, str] = {}
         self._tries: Counter[str] = Counter()
         self._until_right: dict[str, float] = {}
+        self._left_at: dict[str, float] = {}
         self._ledger = ledger
         self._proposals = proposals
         self._witness = witness
@@ -55,10 +57,33 @@ class Duties:
     def _open(self) -> bool:
         return any(self.not_before.get(r.transaction) != math.inf for r in self._ledger.open)
 
-    def not_ended(self) -> list[Unfinished]:
-        """What of the vehicle that is there is to be taken up, or waits for a person."""
+    def not_ended(
+        self, there: Mapping[str, float], heard: Mapping[str, float], condition: VehicleCondition
+    ) -> tuple[UnfinishedView, ...]:
+        """What of the vehicle that is there is to be taken up, or waits for a person.
+
+        Args:
+            there: the autopilot's parameters by name, those that were read since it is there.
+            heard: when each was told last, monotonic, s.
+            condition: the vehicle now.
+        """
+        hindered = self._proposals.forbidden or self._ledger.trouble
+        return tuple(
+            unfinished_view(one, there, condition, heard=heard, hindered=hindered)
+            for one in self._not_ended()
+        )
+
+    def _not_ended(self) -> list[Unfinished]:
         mine = [r for r in self._ledger.open if self._ledger.is_here(r.plan)]
-        found = [Unfinished(recovery=r, waits=self._waits.get(r.transaction, "")) for r in mine]
+        found = [
+            Unfinished(
+                recovery=r,
+                waits=self._waits.get(r.transaction, ""),
+                unanswered=self._ledger.unanswered(r.transaction),
+                since=self._left_at.get(r.transaction, -math.inf),
+            )
+            for r in mine
+        ]
         found += [Unfinished(recovery=r) for r in self.aftercare.lost.values()]
         return found + [Unfinished(recovery=r, asks=True) for r in self.aftercare.asked.values()]
 
@@ -169,6 +194,7 @@ class Duties:
         imu = outcome.plan.imu
         if outcome.open:  # once more after a pause; of another vehicle when one turns up anew
             other = outcome.result is Result.OTHER_VEHICLE
+            self._left_at[outcome.transaction] = now
             tries = self._tries[outcome.transaction]
             self._tries[outcome.transaction] += 1
             pauses = limits.RESUMED_AFTER_S

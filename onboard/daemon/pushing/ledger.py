@@ -18,11 +18,13 @@ from onboard.errors import StateError
 from onboard.push.entries import (
     Entry,
     Planned,
+    ReadBack,
     Recovery,
     Refused,
     Remains,
     Verdict,
     Watched,
+    Writing,
     remains,
 )
 from onboard.push.journal import Journal
@@ -147,6 +149,16 @@ class Ledger:
     def last_undone(self, imu: int) -> Planned | None:
         """The last push of the board that is there, if it was rolled back before it completed."""
         return self._here(self._journal.last_undone(imu))
+
+    def unanswered(self, transaction: str) -> frozenset[str]:
+        """Names that it has written, and not read back since."""
+        names: set[str] = set()
+        for _, entry in self.entries:
+            if isinstance(entry, Writing) and entry.transaction == transaction:
+                names.add(entry.name)
+            elif isinstance(entry, ReadBack) and entry.transaction == transaction:
+                names.discard(entry.name)
+        return frozenset(names)
 
     def all_in_force(
         self, values: Mapping[str, float], writing: int | None = None

@@ -24,7 +24,6 @@ from onboard.daemon.pushing.witness import Witness
 from onboard.daemon.pushing.writer import Writer
 from onboard.daemon.view.notices import Notices
 from onboard.daemon.view.snapshot import PushView
-from onboard.daemon.view.unfinished import unfinished_view
 from onboard.errors import RefusedError
 from onboard.mavlink.autopilot import (
     AutopilotFound,
@@ -250,15 +249,11 @@ class Pusher:
             self._begin(plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
 
-    def view(self, there: Mapping[str, float], condition: VehicleCondition) -> PushView:
-        """For the snapshot.
-
-        Args:
-            there: the autopilot's parameters by name, those that were read since it is there.
-            condition: the vehicle now.
-        """
+    def view(
+        self, there: Mapping[str, float], heard: Mapping[str, float], condition: VehicleCondition
+    ) -> PushView:
+        """For the snapshot; what has not ended as :meth:`Duties.not_ended` says."""
         proposals, ledger = self._proposals, self._ledger
-        hindered = proposals.forbidden or ledger.trouble
         return push_view(
             proposals,
             ledger,
@@ -269,10 +264,7 @@ class Pusher:
             lost=self._duties.aftercare.lost.keys(),
             mixed=self._duties.aftercare.mixed.keys(),
             asked=self._duties.aftercare.asked.keys(),
-            unfinished=tuple(
-                unfinished_view(one, there, condition, hindered=hindered)
-                for one in self._duties.not_ended()
-            ),
+            unfinished=self._duties.not_ended(there, heard, condition),
         )
 
     def _in_force(self) -> dict[int, Planned]:

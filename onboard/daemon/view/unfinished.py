@@ -7,6 +7,7 @@ was lost, and where the autopilot had not stored all.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -20,11 +21,17 @@ LAND = "land and disarm"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unfinished:
-    """One of them; ``waits``: why it is not taken up by itself; ``asks``: a person decides."""
+    """One of them; ``waits``: why it is not taken up by itself; ``asks``: a person decides.
+
+    ``unanswered``: names that were written and not read back when it was left, at ``since``
+    (monotonic, s): what was told of them before says nothing.
+    """
 
     recovery: Recovery
     waits: str = ""
     asks: bool = False
+    unanswered: frozenset[str] = frozenset()
+    since: float = -math.inf
 
 
 def unfinished_view(
@@ -32,6 +39,7 @@ def unfinished_view(
     values: Mapping[str, float],
     condition: VehicleCondition,
     *,
+    heard: Mapping[str, float],
     hindered: str = "",
 ) -> UnfinishedView:
     """It in words.
@@ -40,9 +48,12 @@ def unfinished_view(
         one: what has not come to its end.
         values: the autopilot's parameters by name, those that were read since it is there.
         condition: the vehicle now.
+        heard: when the autopilot told each of them last, monotonic, s.
         hindered: why nothing can be written now whatever the vehicle does, in words.
     """
     plan = one.recovery.plan
+    stale = {n for n in one.unanswered if heard.get(n, -math.inf) < one.since}
+    values = {name: value for name, value in values.items() if name not in stale}
     half = is_half(plan, values)
     return UnfinishedView(
         imu=plan.imu,
@@ -60,10 +71,10 @@ def unfinished_view(
 def is_half(plan: PushPlan, values: Mapping[str, float]) -> bool | None:
     """Whether a part of a plan's new values is in force and a part is not; None: not known."""
     differing = [c for c in plan.changes if c.differs]
-    if any(c.name not in values for c in differing):
-        return None
-    new = [values[c.name] == c.wanted for c in differing]
-    return any(new) and not all(new)
+    new = [values[c.name] == c.wanted for c in differing if c.name in values]
+    if any(new) and not all(new):
+        return True
+    return None if len(new) < len(differing) else False
 
 
 def _sentence(one: Unfinished, half: bool | None, values: Mapping[str, float]) -> str:  # noqa: FBT001 - as found
@@ -80,9 +91,12 @@ def _sentence(one: Unfinished, half: bool | None, values: Mapping[str, float]) -
 
 def _listed(changes: list[Change], values: Mapping[str, float]) -> str:
     """Which values are new, which old, and which are somebody's."""
-    kinds: dict[str, list[str]] = {"new": [], "old": [], "neither": []}
+    kinds: dict[str, list[str]] = {"new": [], "old": [], "neither": [], "not known": []}
     for c in changes:
-        value = values[c.name]
+        value = values.get(c.name)
+        if value is None:
+            kinds["not known"].append(c.name)
+            continue
         kind = "new" if value == c.wanted else "old" if value == c.before else "neither"
         kinds[kind].append(f"{c.name} = {value:.5g}")
     return "; ".join(f"{kind} {', '.join(which)}" for kind, which in kinds.items() if which)
