@@ -114,7 +114,8 @@ async def test_what_was_told_before_it_was_written_is_no_news_of_it(document, da
         one = unfinished(service)
         assert one.half is None
         assert {v.name for v in one.values if v.now is None} == {name}
-        assert "do not arm" in service.snapshot().next_step.text
+        for place, text in everywhere(service).items():
+            assert "do not arm" in text, place
         vehicle._tell = tell
         await until(lambda: service.snapshot().push.state == "idle")
 

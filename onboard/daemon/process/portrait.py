@@ -121,9 +121,9 @@ class Portrait:
         """One line for systemctl status."""
         push = self._push(self.parts.observed.condition(now))
         halves = [
-            f"IMU {one.imu}: half a set is in force: {one.next}"
+            f"IMU {one.imu}: {'half a set is in force' if one.half else 'write interrupted'}: "
+            f"{one.next}"
             for one in _halves(push)
-            if one.half
         ]
         texts = (*halves, self.parts.vigilance.disk, self._doing(now, push))
         return "; ".join(text for text in texts if text)
