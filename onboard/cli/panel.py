@@ -222,6 +222,9 @@ def _push(snapshot: Snapshot) -> RenderableType:
     if push.approval_needed:
         text.append("; approve with `onboard approve`", style="bold yellow")
     lines: list[RenderableType] = [text]
+    for one in push.unfinished:
+        told = f"IMU {one.imu}: {one.sentence}" + (f"; {one.next}" if one.next else "")
+        lines.append(_below(told, style="" if one.half is False else "bold red"))
     if push.last_outcome:
         lines.append(_below(f"last: {push.last_outcome}"))
     table = Table.grid(padding=(0, 2))

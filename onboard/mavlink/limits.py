@@ -180,6 +180,11 @@ more [data]."""
 SELDOM_MS: Final = 250
 """ms between two of each stream while parameters are written: all of them together are 1 kB/s then,
 half of what 19200 baud carry [data]."""
+BEATS_MS: Final = 200
+"""ms between two HEARTBEATs while parameters are written to a vehicle that stands: so late it is
+heard that it has armed; 0.1 kB/s [cost]."""
+BEATS_ASKED: Final = 2
+"""Times that this is asked for, and taken back: one is lost [tuned]."""
 AGAIN_S: Final = (1.0, 5.0, 10.0, 20.0, 40.0, 60.0)
 """s before asking again [ArduPilot: slows streams itself while parameters are fetched]."""
 

@@ -6,7 +6,8 @@ loop rate and an unknown message in the same words, hence the probe with a slow 
 after a first denial, and then bisection for the fastest interval that is granted.  An
 answer is a promise only: rates are measured, and asked for again when they do not come.
 A line that is full has no room for parameters: while they are written to a vehicle that stands,
-less is asked for.
+less is asked for.  And it says oftener then whether it is armed: HEARTBEATs come once a second by
+themselves, and for so long a new value could be set after arming.
 Where the parameters say that ATTITUDE is not always of the body, ATTITUDE_QUATERNION is asked for,
 too.
 """
@@ -105,7 +106,9 @@ class Streams:
         """When it last said yes or no to a question, s: it hears us, and is heard."""
         self.writing: Callable[[], bool] = lambda: False
         """Whether parameters are being written to a vehicle that stands."""
+        self._often, self._beats_to_ask, self._ask_beats_at = False, 0, 0.0
         self._fewer: list[Stream] = []
+        self._owed: dict[int, int] = {}
         self._target: tuple[int, int] | None = None
         self._current: Stream | None = None
         self._rung = 0
@@ -123,9 +126,24 @@ class Streams:
         measured = (stream.request.name for stream in self._streams.values())
         return tuple(dict.fromkeys(("COMMAND_ACK", "PARAM_VALUE", *measured, BODY_ATTITUDE)))
 
+    @property
+    def owes(self) -> bool:
+        """Whether what was made to come seldom has not been granted as before since."""
+        return not self._streams.keys().isdisjoint(self._owed)
+
+    def parting(self) -> Sequence[Message]:
+        """That again, all at once: for who has no time to wait for answers."""
+        beats = [mavlink.MAVLINK_MSG_ID_HEARTBEAT] if self._often or self._beats_to_ask else []
+        return [self._command(number, 0.0) for number in beats] + [
+            self._command(number, 1e3 * interval_ms)
+            for number, interval_ms in self._owed.items()
+            if number in self._streams
+        ]
+
     def start(self, system: int, component: int, now: float) -> None:
         """Begin with this autopilot; again after a reboot, for intervals do not outlive one."""
         if self._target != (system, component):
+            self._owed.clear()
             self._views.forget()
             self._follow_views(now)
             for stream in self._streams.values():
@@ -178,6 +196,8 @@ class Streams:
 
     def poll(self, now: float) -> Sequence[Message]:
         """Measure; return the question that is due, if any."""
+        if beats := self._beats(now):
+            return beats
         if self._fewer:
             if self.writing():
                 return ()
@@ -215,6 +235,24 @@ class Streams:
             for stream in self._streams.values()
         )
 
+    def _beats(self, now: float) -> Sequence[Message]:
+        """Have HEARTBEATs come oftener while parameters are written, and as by itself after it.
+
+        Nobody waits for an answer, and one is not to be taken for another question's.
+        """
+        often = self.writing()
+        if often is not self._often:
+            self._often, self._beats_to_ask, self._ask_beats_at = often, limits.BEATS_ASKED, now
+        if not self._beats_to_ask or now < self._ask_beats_at or self._target is None:
+            return ()
+        self._beats_to_ask -= 1
+        self._ask_beats_at = now + limits.ACK_TIMEOUT_S
+        if self.legacy:
+            return ()
+        self._current = None
+        self._quiet_until = max(self._quiet_until, now + limits.ACK_TIMEOUT_S)
+        return [self._command(mavlink.MAVLINK_MSG_ID_HEARTBEAT, 1e3 * limits.BEATS_MS * often)]
+
     def _ask_for_fewer(self) -> Sequence[Message]:
         """What comes often comes seldom from here on; answers to this have no room either."""
         self._current = None
@@ -223,6 +261,7 @@ class Streams:
             for stream in self._streams.values()
             if stream.granted_ms is not None and stream.granted_ms < limits.SELDOM_MS
         ]
+        self._owed |= {s.number: s.granted_ms or s.request.interval_ms for s in self._fewer}
         return [self._command(s.number, 1e3 * limits.SELDOM_MS) for s in self._fewer]
 
     def _as_before(self, now: float) -> None:
@@ -250,6 +289,7 @@ class Streams:
             self._asked_at = now
             return
         self._current = None
+        self._owed.pop(stream.number, None)
         if self._asks > 1:
             # The earlier tries may be answered yet: let that pass before the next question.
             self._quiet_until = now + limits.ACK_TIMEOUT_S

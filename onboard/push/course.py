@@ -281,6 +281,9 @@ class Course:
         self.record(Undoing(self.identifier, self.reason.value, self.sentence))
 
     def _undo(self, now: float) -> Heard:
+        if self.plan.no_way_back:  # of a journal that somebody has changed, or an older version's
+            sentence = f"not written back: {self.plan.no_way_back}"
+            return self.stuck(Reason.NO_WAY_BACK, sentence, now)
         if not self.progress.turned:
             self._turn()
         self.progress.rounds += 1

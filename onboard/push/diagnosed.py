@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
+from onboard.core.diagnosis.records import REPEATED
 from onboard.core.estimate.result import Calibration
 from onboard.core.physics.catalogue import bearing_of, is_excluded
 from onboard.core.physics.effect import Bearing
@@ -75,6 +76,15 @@ class Diagnosed:
     modelled: bool = False
     document: dict[str, Any] = field(default_factory=dict)
     resumed: bool = False
+
+    @property
+    def died(self) -> str:
+        """That the accelerometer repeated one reading in flight, in words; empty: it did not."""
+        unused = self.document.get("unused") or ()
+        spans = [(u["start_s"], u["end_s"]) for u in unused if u["reason"] == REPEATED]
+        seconds = sum(end - start for start, end in spans if None not in (start, end))
+        said = f"it repeated one reading for {seconds:.0f} s of the flight: broken, or loose"
+        return said if spans else ""
 
     @property
     def left_out(self) -> bool:

@@ -94,6 +94,7 @@ class Journal:
         self._owed: list[tuple[float, Entry]] = []
         self._last: dict[int, list[Planned]] = {}
         self._others: frozenset[str] | None = None
+        self._undone: dict[int, Planned] | None = None
         self._encoder = msgspec.json.Encoder()
         self._decoder = msgspec.json.Decoder(Entry)
         self.damaged = 0
@@ -238,7 +239,7 @@ class Journal:
 
     def _changed(self) -> None:
         self._last.clear()
-        self._others = None
+        self._others = self._undone = None
 
     def _gathered(self, imu: int) -> list[Planned]:
         """The last push that was completed, and the way back from it if there was one.
@@ -266,6 +267,20 @@ class Journal:
     def last_pushed(self, imu: int) -> Planned | None:
         """The last push that was completed, also where it was rolled back since."""
         return next((p for p in self._written(imu) if p.purpose is Purpose.PUSH), None)
+
+    def last_undone(self, imu: int) -> Planned | None:
+        """The last push of this accelerometer, if it was rolled back before it was completed."""
+        if self._undone is None:
+            plans, self._undone = self._plans(), {}
+            for _, entry in self._lines:
+                planned = plans.get(entry.transaction) if isinstance(entry, Closed) else None
+                if planned is None or not isinstance(entry, Closed):
+                    continue
+                if entry.result is Result.COMPLETED:
+                    self._undone.pop(planned.plan.imu, None)
+                elif entry.result is Result.ROLLED_BACK and planned.purpose is Purpose.PUSH:
+                    self._undone[planned.plan.imu] = planned
+        return self._undone.get(imu)
 
     def replaced(self) -> frozenset[str]:
         """Transactions whose values are others now, as was seen or as a flight has told."""

@@ -10,6 +10,10 @@ SCALE_BOUNDS: Final = (0.8, 1.2)
 """ArduPilot's documented range of INS_ACCSCAL_*, no unit."""
 OFFSET_BOUND: Final = 3.5
 """ArduPilot's documented range of INS_ACCOFFS_* to both sides, m/s^2."""
+BACK_OFFSET_BOUND: Final = 9.80665
+"""m/s^2: what ArduPilot's own calibration accepts (AccelCalibrator::accept_result), wider than what
+is documented.  As much may have been in force and flown, and so is written back; a scale has to lie
+in the same range there, or to be zero, which ArduPilot takes for none."""
 ARMING_THRESHOLD: Final = 0.75
 """ArduPilot's default of ARMING_ACCTHRESH, m/s^2, where it has not told its own."""
 

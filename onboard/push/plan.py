@@ -191,6 +191,18 @@ class PushPlan:
         """Scale and offset wanted."""
         return _six([c.wanted for c in self.changes])
 
+    @property
+    def no_way_back(self) -> str:
+        """Why the values of before are never written, in words; empty: they may be.
+
+        A value in force may be anybody's mistake, or read with an error.  What no calibration can
+        have made is not written back, and so nothing may be written in its place either.
+        """
+        for c in self.changes:
+            if c.differs and not _may_have_been(c):
+                return f"{c.name} = {c.before:.5g}, which no calibration can have made"
+        return ""
+
     def reversed(self) -> PushPlan:
         """The plan that takes this one back: written like any other plan."""
         changes = tuple(
@@ -298,6 +310,14 @@ def as_known_now(earlier: PushPlan, known: PushPlan, calibration: Calibration) -
 def offset_is_zero(offset: tuple[float, ...]) -> bool:
     """Whether ArduPilot may take this offset vector for "never calibrated"."""
     return all(abs(o) < limits.UNCHANGED for o in offset)
+
+
+def _may_have_been(change: Change) -> bool:
+    """Whether a value in force may be one that was calibrated, or a default."""
+    if "SCAL" not in change.name:
+        return abs(change.before) <= limits.BACK_OFFSET_BOUND
+    low, high = limits.SCALE_BOUNDS
+    return change.before == 0.0 or low <= change.before <= high
 
 
 def _finite(value: float) -> float | None:

@@ -72,6 +72,7 @@ class Objection(Enum):
     NOTHING_OBSERVED = "nothing_observed"
     NOT_ALLOWED = "name_not_allowed"
     OUT_OF_BOUNDS = "out_of_bounds"
+    NO_WAY_BACK = "no_way_back"
     ZERO_OFFSETS = "zero_offsets"
     NOT_SURE = "not_sure"
     CONTRADICTED = "kept_value_contradicted"
@@ -202,6 +203,9 @@ def judge(
     found = list(moment(condition, settings))
     if condition.armed and settings.mode is Mode.IN_FLIGHT:
         found += _steps(plan, settings)
+    if plan.no_way_back:
+        sentence = f"there would be no way back: in force is {plan.no_way_back}"
+        found.append(_no(Objection.NO_WAY_BACK, sentence))
     return (*found, *objections(plan, calibration, settings, values=values, others=others))
 
 

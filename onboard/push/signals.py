@@ -31,6 +31,7 @@ class Reason(Enum):
     OTHER_VEHICLE = "other_vehicle"
     TOO_LONG = "too_long"
     RESTARTED = "restarted"
+    NO_WAY_BACK = "no_way_back"
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,7 +129,7 @@ def calibration(imu=1, *, scale=(1.02, 0.99, 1.01), offset=(0.2, -0.1, 0.15), **
     return Calibration(**(fields | changes))
 
 
-def convinced(service, *calibrations, missing="", modelled=False, effects=()):
+def convinced(service, *calibrations, missing="", modelled=False, effects=(), unused=()):
     """Have the daemon believe that it has learned these from the flight that has just ended."""
     learner = service.handover._learner
     learner._solve = lambda: None
@@ -139,6 +139,7 @@ def convinced(service, *calibrations, missing="", modelled=False, effects=()):
         "schema": "onboard.explain/1",
         "verdict": verdict,
         "effects": [{"name": name} for name in effects],
+        "unused": list(unused),
     }
     judged = {
         c.imu: Judged(

@@ -45,6 +45,8 @@ class Vehicle(asyncio.DatagramProtocol):
         self.when_set = {}
         """What happens, at once, when it has taken so many writes."""
         self.denied = set()
+        self.intervals_us = {}
+        """What was asked for last, by message."""
         self._address = ("127.0.0.1", port)
         self._firmware = firmware
         self._period = 1.0 / rate
@@ -119,6 +121,8 @@ class Vehicle(asyncio.DatagramProtocol):
                 self._set(message)
             elif kind == "COMMAND_LONG":
                 self.send(mavlink.MAVLink_command_ack_message(message.command, 0))
+                if message.command == 511:
+                    self.intervals_us[int(message.param1)] = message.param2
                 if message.command == 512 and message.param1 == 148:
                     self._introduce()
 

@@ -182,3 +182,11 @@ def test_a_mark_outlives_the_journals_cleaning(tmp_path):
         assert len({e.transaction for _, e in journal.entries}) < 30
         assert journal.replaced() == {"a"}
         assert journal.recover() == ()
+
+
+@pytest.mark.parametrize(("values", "half"), [(MIXED, True), (OTHERS, False), (BEFORE, False)])
+def test_who_sets_some_of_the_old_values_is_told_that_the_others_are_new(bench, values, half):
+    bench.look(values)
+    (notice,) = [n for n in bench.notices.kept if n.kind == "push_replaced"]
+    assert notice.warning is half
+    assert ("the others are as they were written" in notice.text) is half

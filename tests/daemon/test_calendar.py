@@ -49,6 +49,7 @@ def test_a_clock_that_stood_still_is_put_right(wall):
     "clocks",
     [
         Clocks(EPOCH, gps=EPOCH - 1024 * 7 * DAY),  # a receiver that has lost 1024 weeks
+        Clocks(EPOCH, gps=EPOCH + 1024 * 7 * DAY),  # or counted them twice
         Clocks(EPOCH, gps=EPOCH - 5.0),
         Clocks(EPOCH, gps=EPOCH + 5.0),
         Clocks(EPOCH, rate=10.0),  # a simulator in a hurry

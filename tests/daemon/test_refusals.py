@@ -5,6 +5,7 @@ import asyncio
 import pytest
 
 from onboard.errors import RefusedError, StateError
+from onboard.push.entries import Verdict, Watched
 from tests.daemon.daemons import WANTED, calibration, convinced, held_back, pushed, until
 from tests.daemon.standing_vehicle import Vehicle, ardupilot_parameters
 from tests.daemon.strangers import Stranger
@@ -104,6 +105,23 @@ async def test_tightening_by_parameter_holds_and_the_same_again_is_no_news(docum
             assert "not written, for the push policy is 'never'" in said
             await asyncio.sleep(5.0)
             assert vehicle.sets == []
+
+
+async def test_what_would_never_be_written_back_is_not(document, daemon, port, monkeypatch):
+    """Neither for a person nor for a flight: old values of an older version, or made up."""
+    async with daemon(document) as service, Vehicle(port) as vehicle:
+        convinced(service, WANTED)
+        await until(lambda: both(service) == {1})
+        monkeypatch.setattr("onboard.push.limits.BACK_OFFSET_BOUND", 0.055)
+        with pytest.raises(RefusedError, match=r"INS_ACCOFFS_Y = 0\.06"):
+            await service.rollback((1,))
+        transaction = service.parts.journal.last_completed(1).transaction
+        service.parts.pusher.judge([Watched(transaction, Verdict.WORSE, "it flew worse")])
+        await until(lambda: told(service, "push_superseded"))
+        assert "not taken back" in told(service, "push_superseded")[0]
+        await asyncio.sleep(5.0)
+        assert pushed(vehicle)
+        assert len(vehicle.sets) == 6
 
 
 async def test_what_somebody_has_set_since_is_not_offered_for_a_roll_back(document, daemon, port):

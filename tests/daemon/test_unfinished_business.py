@@ -52,6 +52,24 @@ async def test_an_open_write_of_another_vehicle_is_said_once_and_waits(document,
             assert "rolled back" in service.snapshot().push.last_outcome
 
 
+async def test_an_identifier_that_is_right_again_needs_no_reboot(document, daemon, port):
+    """Somebody has set INS_ACC_ID in the middle, and set it right: half a set is in force."""
+    async with Vehicle(port) as vehicle:
+        before = in_force(vehicle)
+        await crashed_in_the_middle(document, vehicle)
+        vehicle.parameters["INS_ACC_ID"] = 4711.0
+        async with daemon(document) as service:
+            await until(lambda: notices(service, "push_other_vehicle"))
+            await ticks(service, 20)
+            assert vehicle.sets == []
+            (one,) = service.snapshot().push.unfinished
+            assert one.half
+            assert "INS_ACC_ID is another accelerometer's" in one.next
+            vehicle.set_by_other("INS_ACC_ID", 2_700_001.0)
+            await until(lambda: service.snapshot().push.state == "idle")
+            assert in_force(vehicle) == before
+
+
 async def test_an_open_write_of_another_board_does_not_stand_in_the_way(document, daemon, port):
     async with Vehicle(port) as vehicle:
         await crashed_in_the_middle(document, vehicle)
@@ -75,7 +93,7 @@ async def test_a_resumption_that_fails_is_tried_again_after_a_pause(document, da
         vehicle.mute_after_sets = 0  # it can be read, but takes no writes
         async with daemon(document) as service:
             await until(lambda: notices(service, "push_interrupted"))
-            await ticks(service, 20)
+            await ticks(service, 10)
             assert service.snapshot().counters["resumed"] == 1
             vehicle.mute_after_sets = None
             service.parts.pusher._duties.not_before.clear()  # the pause is over

@@ -71,7 +71,7 @@ def value(name, number, system=1, component=191):
 def test_numbers_of_states_are_those_of_the_service(module):
     assert len(module.STATES) == len(STATES)
     words = [word.replace(" ", "_") for word in module.IMU_STATES[1:]]
-    assert dict(zip(words, range(1, 10), strict=True)) == dict(STATUSES)
+    assert {word: number for number, word in enumerate(words, start=1)} == dict(STATUSES)
 
 
 def test_status_asks_the_component_and_shows_its_answers_once(module, capsys):

@@ -27,7 +27,7 @@ class World:
         self.streams, self.autopilot = streams, autopilot
         self.there, self.back = LossyLine(1, **line), LossyLine(2, **line)
         self.now = 100.0
-        self._blank = {name: blank(name) for name in streams.names}
+        self._blank = {name: blank(name) for name in (*streams.names, "HEARTBEAT")}
         streams.start(1, 1, self.now)
 
     def run(self, seconds: float) -> None:

@@ -8,7 +8,7 @@ from onboard.mavlink.parameter_messages import SendAction, SendParamSet, ValueRe
 from onboard.push import limits
 from onboard.push.entries import Planned, Result, audit
 from onboard.push.signals import Cancelled, LinkLost, Reason, Rebooted, VehicleReport
-from tests.push.pushing import finish, make_plan, when_written
+from tests.push.pushing import OLD, PushWorld, finish, make_plan, when_written
 
 
 @pytest.mark.parametrize("number", range(6))
@@ -356,3 +356,16 @@ def test_undoing_that_nobody_answers_ends_at_its_own_deadline(world):
     (outcome,) = world.outcomes
     assert (outcome.result, outcome.reason) == (Result.INTERRUPTED, Reason.ARMED)
     assert world.now - armed[0] == pytest.approx(limits.ARMED_UNDO_S, abs=1e-6)
+
+
+def test_old_values_that_no_calibration_can_have_made_are_not_written_back(tmp_path):
+    """A journal that somebody has changed: half of it is in force, and that is left and told."""
+    world = PushWorld(tmp_path / "journal", make_plan(old=((0.3, 1.0, 1.0), OLD[1])), life=30)
+    assert not world.run_through()
+    assert world.holds() == "mixed"
+    written = len(world.autopilot.history)
+    world.restart()
+    (outcome,) = world.outcomes
+    assert outcome.open
+    assert "INS_ACCSCAL_X = 0.3" in outcome.sentence
+    assert len(world.autopilot.history) == written

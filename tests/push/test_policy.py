@@ -209,6 +209,19 @@ class TestBounds:
         )
         assert objections(cal, scale=(1.3, 1.0, 1.0)) == set()
 
+    @pytest.mark.parametrize(
+        ("now", "refused"),
+        [
+            ({"scale": (0.5, 1.0, 1.0)}, True),
+            ({"scale": (-1.0, 1.0, 1.0)}, True),
+            ({"scale": (0.0, 0.0, 0.0)}, False),  # ArduPilot takes that for none
+            ({"offset": (0.1, -30.0, 0.1)}, True),
+            ({"offset": (0.1, -9.0, 0.1)}, False),  # its own calibration accepts as much
+        ],
+    )
+    def test_nothing_is_written_over_what_would_never_be_written_back(self, now, refused):
+        assert (Objection.NO_WAY_BACK in objections(**now)) is refused
+
 
 class TestInFlight:
     SETTINGS = PolicySettings(mode=Mode.IN_FLIGHT)

@@ -19,11 +19,12 @@ COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 REAL32 = 9  # MAV_PARAM_TYPE_REAL32
 STATES = (
     "no autopilot", "waiting for GPS", "learning", "calibrated", "waits for `obc approve`",
-    "writing", "stopping",
+    "writing", "stopping", "half written",
 )  # fmt: skip
 IMU_STATES = (
     "not heard of", "collecting", "calibrated", "insufficient", "invalid", "approval",
     "held back", "writing", "up to date", "rejected",
+    "half written",
 )  # fmt: skip
 SHOWN = ("OBC_STATE", "OBC_TRUST", "OBC_COVERAGE", "OBC_WAITING")
 IMUS = (1, 2, 3)

@@ -54,17 +54,19 @@ def summary(snapshot: Snapshot) -> SummaryMessage:
         for view in snapshot.imus
     )
     gravest = max(imus, key=lambda imu: GRAVITY.index(imu.severity), default=None)
-    link = snapshot.link
+    link, step = snapshot.link, snapshot.next_step
+    half = any(one.half for one in snapshot.push.unfinished)
+    alone = "half_written" if half else link.state
     return SummaryMessage(
         system_id=link.system_id,
         link=link.state,
         armed=link.armed,
         gps_trusted=snapshot.trust.open,
         trusted_s=round(snapshot.trust.trusted_s),
-        state=link.state if gravest is None else gravest.state,
-        title=link.state if gravest is None else gravest.title,
-        severity="info" if gravest is None else gravest.severity,
-        next="" if snapshot.next_step is None else snapshot.next_step.text,
+        state=alone if gravest is None else gravest.state,
+        title=alone.replace("_", " ") if gravest is None else gravest.title,
+        severity=("error" if half else "info") if gravest is None else gravest.severity,
+        next="" if step is None else step.text,
         approval_needed=snapshot.push.approval_needed,
         imus=imus,
     )

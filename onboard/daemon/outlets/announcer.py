@@ -64,6 +64,8 @@ LINES: Final[Mapping[str, Line]] = MappingProxyType(
         "push_not_stored": Line(WARNING, "{imu} written values are gone, undoing", "push {imu}"),
         "push_gone": Line(WARNING, "{imu} old values are there again", "push {imu}"),
         "push_mixed": Line(WARNING, "{imu} old and new values mixed", "push {imu}"),
+        "half_written": Line(ERROR, "{imu} half a set in force: land, disarm", "half {imu}"),
+        "half_written_standing": Line(ERROR, "{imu} half a set in force: do not arm", "half {imu}"),
         "push_resumed": Line(WARNING, "{imu} interrupted write taken up", "push {imu}"),
         "push_kept": Line(INFO, "new calibration flew well"),
         "push_doubted": Line(WARNING, "calibration does not fit this flight"),

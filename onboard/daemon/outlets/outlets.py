@@ -84,6 +84,7 @@ class Outlets:
         self._finding: tuple[int, str] = (0, "")
         self._approval_needed = False
         self._states: dict[int, str] = {}
+        self._halves: set[tuple[int, str]] = set()
         self._server: ParameterServer | None = None
         self._announcer: Announcer | None = None
         self._publisher: Publisher | None = None
@@ -126,6 +127,7 @@ class Outlets:
         self._tell_of_physics(snapshot)
         self._tell_of_approval(snapshot)
         self._tell_of_states(snapshot)
+        self._tell_of_halves(snapshot)
         if self._server is not None:
             self._server.update(self._values(snapshot))
         if self._publisher is not None:
@@ -210,6 +212,17 @@ class Outlets:
             self._states[imu.imu] = state.title
             if state.name in {"held_back", "insufficient"}:
                 self._notices.post("imu_state", f"IMU {imu.imu}: {state.title}", warning=True)
+
+    def _tell_of_halves(self, snapshot: Snapshot) -> None:
+        """Say of each half set what to do about it, and again when that changes: it has armed."""
+        halves = {(one.imu, one.next): one for one in snapshot.push.unfinished if one.half}
+        for key in halves.keys() - self._halves:
+            one = halves[key]
+            text = f"IMU {one.imu}: {one.sentence}; {one.next}"
+            kind = "half_written" if snapshot.link.armed else "half_written_standing"
+            self._notices.post(kind, text, warning=True)
+        if halves or snapshot.push.state == "idle":  # else it is being seen to, maybe in vain
+            self._halves = set(halves)
 
     # Diagnosis
 

@@ -50,6 +50,7 @@ STATES: Final[Mapping[str, int]] = MappingProxyType(
         "approval": 4,  # something waits for a person
         "writing": 5,
         "stopping": 6,
+        "half_written": 7,  # half a set is in force
     }
 )
 
@@ -149,6 +150,8 @@ def _state(snapshot: Snapshot) -> str:
         return "stopping"
     if snapshot.link.system_id is None or snapshot.link.state != "present":
         return "no_autopilot"
+    if any(one.half for one in snapshot.push.unfinished):
+        return "half_written"
     if snapshot.push.state not in {"idle", "interrupted"}:
         return "writing"
     names = {imu.state.name for imu in snapshot.imus}

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from onboard.daemon.process import limits
+from onboard.daemon.view.snapshot import DATED_FROM
 from onboard.mavlink.dialect import MESSAGE_IDS, Message
 from onboard.mavlink.limits import UNIX_FROM_US
 
@@ -41,6 +42,8 @@ class Calendar:
         if self._believed is None:
             return ours
         theirs = self._clock() + self._believed
+        if ours >= DATED_FROM and theirs - ours > limits.WEEKS_LOST_S:
+            return ours
         return theirs if theirs - ours > limits.CLOCK_STOOD_S else ours
 
     def feed(self, message: Message) -> None:

@@ -21,6 +21,9 @@ start itself]."""
 FINISH_PUSH_S: Final = 8.0
 """s that a transaction under way gets at shutdown; then it stays open, to be resumed [service:
 with SAVE_S and the broker's farewell inside TimeoutStopSec]."""
+RATES_BACK_S: Final = 4.0
+"""s at shutdown to have samples come as often as before a push: a second of silence, then some
+eight questions, each with its answer [service: as before]."""
 SAVE_S: Final = 5.0
 """s that the learner gets at shutdown for what has come and its last save [service: as before]."""
 STALL_S: Final = 0.05
@@ -46,6 +49,10 @@ CLOCK_APART_S: Final = 60.0
 CLOCK_STOOD_S: Final = 60.0
 """s that the autopilot's time of day is ahead of ours from which on ours has stood still: what
 people read has minutes [use]."""
+WEEKS_LOST_S: Final = 1000 * 7 * 86400.0
+"""s that the autopilot's time is ahead of a clock of ours that was once set from which on it is not
+believed: a receiver that has counted its 1024 weeks once too often [protocol: the week's 10 bits].
+"""
 CLOCKS_AGREE_S: Final = 3.0
 """s that two reports of a time may lie apart, beside what went by between them: what the slowest
 links delay, and the clock's being told in whole seconds [data]."""

@@ -16,7 +16,7 @@ from onboard.daemon.view.accelerometers import imu_view
 from onboard.daemon.view.journal_lines import journal_view
 from onboard.daemon.view.link_health import link_view
 from onboard.daemon.view.numbers import finite_values
-from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView
+from onboard.daemon.view.snapshot import ImuView, PushView, Snapshot, StepView, UnfinishedView
 from onboard.daemon.view.state import ERROR, INFO, WARNING, Circumstances, next_step
 from onboard.daemon.view.trust import NO_TRUST
 from onboard.mavlink.autopilot import AutopilotState
@@ -37,7 +37,7 @@ class Portrait:
         """Everything, now."""
         learned = self.parts.handover.learned
         condition = self.parts.observed.condition(now)
-        push = self.parts.pusher.view()
+        push = self._push(condition)
         imus = self._imus(push, condition)
         return Snapshot(
             version=__version__,
@@ -51,7 +51,10 @@ class Portrait:
                 condition=condition,
                 messages=self.parts.traffic.view(self.parts.streams.report()),
                 signed=self.parts.signing is not None,
-                warnings=self.parts.vigilance.warnings(now),
+                warnings=(
+                    *(f"IMU {half.imu}: {half.sentence}" for half in _halves(push)),
+                    *self.parts.vigilance.warnings(now),
+                ),
             ),
             trust=NO_TRUST if learned is None else learned.trust,
             imus=imus,
@@ -63,8 +66,13 @@ class Portrait:
             notices=self.parts.notices.kept,
             counters=self._counters(),
             diagnosis=self.parts.diagnoses.document,
-            next_step=self._next_step(now, imus),
+            next_step=self._next_step(now, imus, push),
         )
+
+    def _push(self, condition: VehicleCondition) -> PushView:
+        known = self.parts.parameters
+        there = {name: known.values[name] for name in known.confirmed}
+        return self.parts.pusher.view(there, known.heard, condition)
 
     def _imus(self, push: PushView, condition: VehicleCondition) -> tuple[ImuView, ...]:
         """What is known of each accelerometer."""
@@ -72,6 +80,7 @@ class Portrait:
         proposals = {proposal.imu: proposal for proposal in push.proposals}
         values = self.parts.parameters.values
         known = self.parts.proposals
+        halves = {half.imu: half for half in _halves(push)}
         impossible = {} if known.forbidden else known.impossible
         return tuple(
             imu_view(
@@ -82,13 +91,17 @@ class Portrait:
                     written=imu in push.can_roll_back,
                     flying=condition.may_fly,
                     impossible=impossible.get(imu, ""),
+                    half=halves.get(imu),
                 ),
                 values,
             )
             for imu, calibration in (learned.calibrations.items() if learned else ())
         )
 
-    def _next_step(self, now: float, imus: Sequence[ImuView]) -> StepView | None:
+    def _next_step(self, now: float, imus: Sequence[ImuView], push: PushView) -> StepView | None:
+        if halves := _halves(push):
+            severity = ERROR if halves[0].half else WARNING
+            return StepView(imu=halves[0].imu, text=halves[0].next, severity=severity)
         if self.parts.vigilance.stopped:
             return StepView(imu=None, text=self.parts.vigilance.stopped, severity=ERROR)
         return next_step(imus) if imus else self._first_step(now)
@@ -106,10 +119,16 @@ class Portrait:
 
     def sentence(self, now: float) -> str:
         """One line for systemctl status."""
-        disk = self.parts.vigilance.disk
-        return "; ".join(text for text in (disk, self._doing(now)) if text)
+        push = self._push(self.parts.observed.condition(now))
+        halves = [
+            f"IMU {one.imu}: {'half a set is in force' if one.half else 'write interrupted'}: "
+            f"{one.next}"
+            for one in _halves(push)
+        ]
+        texts = (*halves, self.parts.vigilance.disk, self._doing(now, push))
+        return "; ".join(text for text in texts if text)
 
-    def _doing(self, now: float) -> str:
+    def _doing(self, now: float, push: PushView) -> str:
         """What it does, in a few words."""
         if self.parts.link.autopilot is None:
             return "waiting for an autopilot's heartbeat"
@@ -118,7 +137,7 @@ class Portrait:
         learned = self.parts.handover.learned
         if learned is None:
             return f"{self.parts.link.state.value}, nothing learned yet"
-        views = self._imus(self.parts.pusher.view(), self.parts.observed.condition(now))
+        views = self._imus(push, self.parts.observed.condition(now))
         imus = ", ".join(f"IMU {view.imu} {view.state.title}" for view in views)
         trust = "trusted" if learned.trust.open else "not trusted"
         lag = self.parts.handover.behind(now)
@@ -146,3 +165,8 @@ class Portrait:
             total["recorded_frames"] = self.parts.recorder.frames
             total["recording_dropped"] = self.parts.recorder.dropped
         return dict(total)
+
+
+def _halves(push: PushView) -> tuple[UnfinishedView, ...]:
+    """Writes of which half is in force, or may be."""
+    return tuple(one for one in push.unfinished if one.half is not False)

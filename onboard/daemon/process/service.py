@@ -32,6 +32,7 @@ from onboard.daemon.setup import settings
 from onboard.daemon.setup.configuration import Configuration
 from onboard.daemon.view.snapshot import Snapshot
 from onboard.errors import OnboardError
+from onboard.mavlink.autopilot import AutopilotState
 from onboard.mavlink.decode import Decoder, is_armed, is_autopilot
 from onboard.mavlink.dialect import Message
 from onboard.push.policy import Mode
@@ -231,6 +232,7 @@ class Service:
         self._notifier.send(STOPPING="1", STATUS="stopping")
         self.parts.pusher.close()
         await self._finish_push()
+        await self._give_rates_back()
         await self._outlets.close()
         if self.server is not None:
             await self.server.close()
@@ -247,6 +249,17 @@ class Service:
         except TimeoutError:
             if self.parts.journal.recover():  # else nothing of it was written
                 logger.warning("a push is left open; it is finished or undone after the next start")
+
+    async def _give_rates_back(self) -> None:
+        """Samples made room for a push: nobody else would ask for them again."""
+        streams, link = self.parts.streams, self.link
+        streams.writing = lambda: False
+        for _ in range(20):
+            if not streams.owes or link.state is not AutopilotState.PRESENT:
+                break
+            await asyncio.sleep(limits.RATES_BACK_S / 20)
+        for message in streams.parting():
+            link.send(message)
 
     async def _let_go(self) -> None:
         """Whatever way it ended: no port, file or lock stays behind."""

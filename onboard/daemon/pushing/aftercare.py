@@ -11,13 +11,18 @@ open.**  Values that are others now have come there in one of four ways:
 * *Nobody can tell*: the service was not there, or the autopilot fell silent and rebooted, and some
   are those of before.  That is said, and a person may have the others put back.
 * *All are those of before.*  Nothing is left to be put back: that is only written down.
+
+And values that were put back may be new again: a line can hold a write for longer than anybody
+waits for it, and give it to the autopilot when its transaction has long been closed.  Half a set is
+in force then.  That is said, and a person may have it put back.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping
 
-from onboard.daemon.pushing.ledger import Ledger
+from onboard.daemon.pushing.ledger import IMUS, Ledger
 from onboard.daemon.view.notices import Notices
 from onboard.push.entries import (
     NOT_STORED,
@@ -34,6 +39,8 @@ from onboard.push.entries import (
 from onboard.push.signals import Reason
 
 ASKED = "a person had it put back"
+LATE_LOOKS = 3
+"""Looks, once a second, at which it has to be so: who sets the same six from a file takes time."""
 
 
 class Aftercare:
@@ -48,6 +55,8 @@ class Aftercare:
         self.lost: dict[int, Recovery] = {}
         """What the autopilot had not stored, by accelerometer: to be taken up."""
         self._mixed: dict[int, Recovery] = {}
+        self._late: dict[int, Recovery] = {}
+        self._late_looks: Counter[int] = Counter()
         self._ledger = ledger
         self._notices = notices
         self._seen: dict[int, str] = {}
@@ -58,6 +67,11 @@ class Aftercare:
     def mixed(self) -> Mapping[int, Recovery]:
         """Accelerometers with old and new values, nobody knows why, and their way back."""
         return self._mixed
+
+    @property
+    def asked(self) -> dict[int, Recovery]:
+        """All of which a person decides: those, and writes that came when they were taken back."""
+        return {**self._mixed, **self._late}
 
     # What happens to the autopilot
 
@@ -85,12 +99,18 @@ class Aftercare:
         """Another board is there, for all that is known."""
         self._seen.clear()
         self._mixed.clear()
+        self._late.clear()
 
     def wrote(self, imu: int, transaction: str) -> None:
         """A transaction has just read back what it had written."""
         self._looked.add(imu)
         self._seen[imu] = transaction
         self._mixed.pop(imu, None)
+
+    def undone(self, imu: int) -> None:
+        """A transaction has just read back what had been in force before it."""
+        self._mixed.pop(imu, None)
+        self._late.pop(imu, None)
 
     # Looking
 
@@ -104,9 +124,10 @@ class Aftercare:
             confirmed: names whose values were read since it was there again.
             unasked: whether anything may be written that no person has approved.
         """
-        self._look_again(values)
         names = set(confirmed)
-        left = self._ledger.left()
+        self._look_for_late(values, names)
+        self._look_again(values)
+        left = self._left()
         for imu in self._mixed.keys() - left.keys():
             del self._mixed[imu]
         all_read = True
@@ -123,9 +144,34 @@ class Aftercare:
         if all_read:
             self._rebooted = self._silent = False
 
+    def _left(self) -> dict[int, Planned]:
+        """What was written last and is ours, but for what came late over it."""
+        left = self._ledger.left()
+        return {imu: written for imu, written in left.items() if not self._late_looks[imu]}
+
+    def _look_for_late(self, values: Mapping[str, float], names: Collection[str]) -> None:
+        """Whether something of a push that was rolled back is in force again."""
+        for imu in IMUS:
+            undone = self._ledger.last_undone(imu)
+            known = undone is not None and set(undone.plan.names) <= set(names)
+            found = remains(undone.plan, values) if undone is not None and known else None
+            if undone is None or found is not Remains.MIXED:
+                self._late_looks[imu] = 0
+                self._late.pop(imu, None)
+                continue
+            self._late_looks[imu] += 1
+            if self._late_looks[imu] == LATE_LOOKS:
+                self._late[imu] = Recovery.undoing(undone, ASKED)
+                again = [c.name for c in undone.plan.changes if values[c.name] != c.before]
+                text = (
+                    f"IMU {imu}: {', '.join(again)} as in a write that was taken back: a late copy "
+                    f"of it, or set by somebody; `onboard rollback {imu}` puts the old values back"
+                )
+                self._notices.post("push_late", text, warning=True)
+
     def _look_again(self, values: Mapping[str, float]) -> None:
         """What has changed while the autopilot was listened to, somebody has changed."""
-        for imu, written in self._ledger.left().items():
+        for imu, written in self._left().items():
             found = remains(written.plan, values) if imu in self._looked else None
             if found is Remains.WHOLE:
                 self._there(imu, written)
@@ -172,7 +218,9 @@ class Aftercare:
         self._ledger.append(Replaced(written.transaction, sentence))
         self._mixed.pop(imu, None)
         self.lost.pop(imu, None)
-        self._notices.post("push_replaced", f"IMU {imu}: {sentence}: that stays")
+        half = remains(written.plan, values) is Remains.MIXED
+        told = f"{sentence}: that stays" + ("; the others are as they were written" if half else "")
+        self._notices.post("push_replaced", f"IMU {imu}: {told}", warning=half)
 
     def _not_stored(self, imu: int, written: Planned, values: Mapping[str, float]) -> None:
         """Back to the old ones, whether they were to go or to come back."""

@@ -18,14 +18,17 @@ from onboard.errors import StateError
 from onboard.push.entries import (
     Entry,
     Planned,
+    ReadBack,
     Recovery,
     Refused,
     Remains,
     Verdict,
     Watched,
+    Writing,
     remains,
 )
 from onboard.push.journal import Journal
+from onboard.push.plan import PushPlan
 from onboard.push.signals import JournalFailed, JournalWritten
 
 logger = logging.getLogger(__name__)
@@ -118,10 +121,13 @@ class Ledger:
 
     def _here(self, planned: Planned | None) -> Planned | None:
         """It, if it was written to the board that is there."""
-        if planned is None or self.system_id is None:
-            return planned
-        here = planned.plan.vehicle.same_airframe(self.system_id, self.board)
-        return planned if here else None
+        return planned if planned is not None and self.is_here(planned.plan) else None
+
+    def is_here(self, plan: PushPlan) -> bool:
+        """Whether a plan is for the board that is there, as far as is known."""
+        if self.system_id is None:
+            return True
+        return plan.vehicle.same_airframe(self.system_id, self.board)
 
     def left(self) -> dict[int, Planned]:
         """What was written last to each accelerometer, a push or the way back, and is still ours.
@@ -139,6 +145,20 @@ class Ledger:
     def last_pushed(self, imu: int) -> Planned | None:
         """The last push that was completed on the board that is there, rolled back or not."""
         return self._here(self._journal.last_pushed(imu))
+
+    def last_undone(self, imu: int) -> Planned | None:
+        """The last push of the board that is there, if it was rolled back before it completed."""
+        return self._here(self._journal.last_undone(imu))
+
+    def unanswered(self, transaction: str) -> frozenset[str]:
+        """Names that it has written, and not read back since."""
+        names: set[str] = set()
+        for _, entry in self.entries:
+            if isinstance(entry, Writing) and entry.transaction == transaction:
+                names.add(entry.name)
+            elif isinstance(entry, ReadBack) and entry.transaction == transaction:
+                names.discard(entry.name)
+        return frozenset(names)
 
     def all_in_force(
         self, values: Mapping[str, float], writing: int | None = None

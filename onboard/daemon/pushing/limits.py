@@ -33,6 +33,10 @@ DISK_TRIED_S: Final = 10.0
 WAIT_AFTER_FAILURE_S: Final = (30.0, 60.0, 120.0, 300.0)
 """s between a transaction that did not complete and the next for that accelerometer, after one
 failure, two, and so on [tuned]."""
+RESUMED_AFTER_S: Final = (2.0, 5.0, 10.0, 30.0, 60.0)
+"""s between a transaction that is left open and the next try to end it: half a set may be in force,
+and whoever stands by the vehicle may arm at any moment; one try asks for 20 s on a line that does
+not answer [cost]."""
 MOVED_SIGMAS: Final = 2.0
 """An approval is of the values shown: it lapses when an estimate moves by more than so many of its
 standard deviations [probability: 5 %]."""

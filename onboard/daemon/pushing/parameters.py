@@ -75,6 +75,8 @@ class ParameterWatch:
         self.counters: Counter[str] = Counter()
         self.enabled = True
         self.twofold = Twofold()
+        self.heard: dict[str, float] = {}
+        """When each that is needed was told last, by our own clock, s."""
         self._asked_again: dict[str, float] = {}
         self._to_ask: dict[str, float] = {}
         self._client = ParameterClient()
@@ -145,6 +147,8 @@ class ParameterWatch:
         )
         if isinstance(event, ValueReceived):
             self.twofold.take(event.name, event.value, now)
+            if event.name in NEEDED:
+                self.heard[event.name] = now
         return () if event is None else self._act(self._client.feed(event, now), now)
 
     def poll(self, now: float) -> Sequence[Message]:

@@ -9,10 +9,10 @@ from onboard.daemon.view.state import NOTHING_GAINED, landing_lifts
 
 PEOPLE: Final = frozenset({"approval", "refused", "unconfirmed"})
 """Reasons that a person lifts."""
-DIAGNOSIS: Final = frozenset({"physics_missing", "not_diagnosed"})
+DIAGNOSIS: Final = frozenset({"physics_missing", "imu_stuck", "not_diagnosed"})
 """Reasons that a person lifts by saying so explicitly."""
-UNWRITABLE: Final = frozenset({"out_of_bounds", "zero_offsets", "name_not_allowed"})
-"""Reasons against the very values that an approval would be for."""
+UNWRITABLE: Final = frozenset({"out_of_bounds", "no_way_back", "zero_offsets", "name_not_allowed"})
+"""Reasons against the very values that an approval would be for, or against those of before."""
 
 
 def approvable(held_back: Mapping[str, str]) -> bool:

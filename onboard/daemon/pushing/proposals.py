@@ -328,6 +328,8 @@ class Proposals:
             return {}
         if found is None:
             return {"not_diagnosed": "no flight was diagnosed yet: that is done after a landing"}
+        if found.died and not found.missing:
+            return {"imu_stuck": found.died}
         if not found.missing:
             return {}
         offered = "; these values have it modelled" if found.modelled else ""

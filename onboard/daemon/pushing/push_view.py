@@ -7,7 +7,13 @@ from collections.abc import Collection, Mapping
 from onboard.daemon.pushing.ledger import Ledger
 from onboard.daemon.pushing.people import approvable
 from onboard.daemon.pushing.proposals import Proposals
-from onboard.daemon.view.snapshot import ChangeView, JudgedView, ProposalView, PushView
+from onboard.daemon.view.snapshot import (
+    ChangeView,
+    JudgedView,
+    ProposalView,
+    PushView,
+    UnfinishedView,
+)
 from onboard.daemon.view.state import WAITING
 from onboard.daemon.view.written import written_view
 from onboard.push.entries import Planned, Purpose
@@ -25,6 +31,8 @@ def push_view(
     in_force: Mapping[int, Planned],
     lost: Collection[int] = (),
     mixed: Collection[int] = (),
+    asked: Collection[int] = (),
+    unfinished: tuple[UnfinishedView, ...] = (),
 ) -> PushView:
     """What the snapshot says of pushes.
 
@@ -37,6 +45,8 @@ def push_view(
         in_force: pushes whose values the autopilot has, by accelerometer.
         lost: accelerometers whose values the autopilot had not stored: to be put back.
         mixed: accelerometers that have old and new values, nobody knows why.
+        asked: accelerometers of which a person decides: those, and writes that came late.
+        unfinished: writes that have not come to their end.
     """
     current = proposals.current.items()
     waiting = (p.held_back.keys() for i, p in current if p.held_back and i != proposals.writing)
@@ -49,7 +59,7 @@ def push_view(
         active_imu=None if transaction is None else transaction.plan.imu,
         proposals=proposal_views(proposals),
         last_outcome=None if last is None else told(last),
-        can_roll_back=tuple(sorted(in_force.keys() | set(mixed))),
+        can_roll_back=tuple(sorted(in_force.keys() | set(asked))),
         judged=judged,
         written=written_view(
             ledger.entries,
@@ -58,6 +68,7 @@ def push_view(
             in_force={imu: pushed.transaction for imu, pushed in in_force.items()},
             mixed=mixed,
         ),
+        unfinished=unfinished,
     )
 
 

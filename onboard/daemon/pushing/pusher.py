@@ -222,9 +222,9 @@ class Pusher:
         Raises:
             RefusedError: there is no push in force, or now is not the moment.
         """
-        in_force, mixed = self._in_force(), self._duties.aftercare.mixed
-        in_force |= {imu: pushed for imu in mixed if (pushed := self._ledger.last_pushed(imu))}
-        chosen = [imu for imu in imus or in_force if imu in in_force]
+        asked = self._duties.aftercare.asked
+        plans = {imu: written.plan for imu, written in (self._in_force() | asked).items()}
+        chosen = [imu for imu in imus or plans if imu in plans]
         if not chosen:
             raise RefusedError("no push is in force that could be rolled back")
         if len(chosen) > 1:
@@ -240,15 +240,19 @@ class Pusher:
         against = self._duties.against(self._condition)
         if against:
             raise RefusedError(against)
-        imu = chosen[0]
-        if imu in mixed:
-            self._resume(mixed[imu], now)
+        imu, plan = chosen[0], plans[chosen[0]]
+        if plan.no_way_back:
+            raise RefusedError(f"before the push was {plan.no_way_back}: not written back")
+        if imu in asked:
+            self._resume(asked[imu], now)
         else:
-            self._begin(in_force[imu].plan.reversed(), Purpose.ROLL_BACK, now)
+            self._begin(plan.reversed(), Purpose.ROLL_BACK, now)
         return f"rolling back IMU {imu}"
 
-    def view(self) -> PushView:
-        """For the snapshot."""
+    def view(
+        self, there: Mapping[str, float], heard: Mapping[str, float], condition: VehicleCondition
+    ) -> PushView:
+        """For the snapshot; what has not ended as :meth:`Duties.not_ended` says."""
         proposals, ledger = self._proposals, self._ledger
         return push_view(
             proposals,
@@ -259,6 +263,8 @@ class Pusher:
             in_force=self._in_force(),
             lost=self._duties.aftercare.lost.keys(),
             mixed=self._duties.aftercare.mixed.keys(),
+            asked=self._duties.aftercare.asked.keys(),
+            unfinished=self._duties.not_ended(there, heard, condition),
         )
 
     def _in_force(self) -> dict[int, Planned]:
@@ -382,5 +388,5 @@ class Pusher:
         else:
             changed = outcome.reason is Reason.CHANGED_BY_OTHER
             self._proposals.failed(imu, now, changed_by_other=changed)
-        self._duties.ended(outcome)
+        self._duties.ended(outcome, now)
         self._read_ledger()

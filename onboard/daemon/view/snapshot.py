@@ -244,6 +244,29 @@ class JudgedView(Record, frozen=True, kw_only=True):
     velocity_rms_after_push_m_s: float | None
 
 
+class UnfinishedValue(Record, frozen=True, kw_only=True):
+    """One parameter of a write that has not ended; ``now``: as read last, None: not known yet."""
+
+    name: str
+    before: float
+    written: float
+    now: float | None
+
+
+class UnfinishedView(Record, frozen=True, kw_only=True):
+    """A write that has not come to its end (:mod:`onboard.daemon.view.unfinished`).
+
+    ``half``: a part of its values is in force and a part is not; None: not known yet.  ``next`` is
+    what a person should do about it, empty: nothing.
+    """
+
+    imu: int
+    half: bool | None
+    values: tuple[UnfinishedValue, ...]
+    sentence: str
+    next: str
+
+
 class PushView(Record, frozen=True, kw_only=True):
     """Policy, proposals, the transaction under way and the outcome of the last.
 
@@ -251,6 +274,7 @@ class PushView(Record, frozen=True, kw_only=True):
     ``can_roll_back``: accelerometers that have the values of their last push, or, nobody knows
     why, some of them and some of those from before.  ``written``: pushes
     that were completed, oldest first; of each accelerometer the first and the last few.
+    ``unfinished``: writes that have not come to their end, and are not under way.
     """
 
     policy: str
@@ -263,6 +287,7 @@ class PushView(Record, frozen=True, kw_only=True):
     can_roll_back: tuple[int, ...]
     judged: tuple[JudgedView, ...] = ()
     written: tuple[WrittenView, ...] = ()
+    unfinished: tuple[UnfinishedView, ...] = ()
 
 
 class JournalLine(Record, frozen=True, kw_only=True):

@@ -15,7 +15,7 @@ from typing import Final
 
 from onboard.answers.knowledge import calibrated, knowledge
 from onboard.core.estimate.result import Calibration, Status
-from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView
+from onboard.daemon.view.snapshot import ImuView, ProposalView, StateView, StepView, UnfinishedView
 
 NAMES: Final = (
     "collecting",
@@ -27,6 +27,7 @@ NAMES: Final = (
     "writing",
     "up_to_date",
     "rejected",
+    "half_written",
 )
 """All that a state may be called."""
 AFTER_LANDING: Final = frozenset(
@@ -55,10 +56,12 @@ FLY_AGAIN = "fly again: the next flight decides on these values"
 TO_DO: Final[Mapping[str, str]] = MappingProxyType(
     {
         "no_journal": "see to the companion's disk: it is full, read-only or failing",
+        "imu_stuck": "see to the accelerometer before the next flight",
         "doubtful": "find out who else sends, then reset what was learned",
         "temperature_learning": "let the autopilot finish its temperature calibration",
         "temperature_reference_unknown": "calibrate the accelerometers on the bench once",
         "out_of_bounds": "calibrate on the bench, and check how the autopilot is mounted",
+        "no_way_back": "set it to what it was, or calibrate on the bench",
         "kept_value_contradicted": "run onboard explain on the recording",
         "unconfirmed": FLY_AGAIN,
         "not_sure": FLY_AGAIN,
@@ -73,7 +76,8 @@ _GRAVEST = (ERROR, WARNING, INFO, GOOD)
 class Circumstances:
     """What else decides: ``writing`` and ``written`` are about this accelerometer.
 
-    ``impossible``: why nothing can be proposed, where there is no proposal.
+    ``impossible``: why nothing can be proposed, where there is no proposal.  ``half``: half a set
+    is in force, or may be.
     """
 
     proposal: ProposalView | None = None
@@ -81,6 +85,7 @@ class Circumstances:
     written: bool = False
     flying: bool = False
     impossible: str = ""
+    half: UnfinishedView | None = None
 
 
 ALONE: Final = Circumstances()
@@ -96,6 +101,12 @@ def state_of(c: Calibration, now: Circumstances = ALONE) -> StateView:
     """
     if now.writing:
         return _state("writing", "being written", "its values are being written", INFO)
+    if now.half is not None:
+        half = now.half
+        title = "half a set in force" if half.half else "write interrupted"
+        return _state(
+            "half_written", title, half.sentence, ERROR if half.half else WARNING, half.next
+        )
     match c.status:
         case Status.INVALID:
             return _state("invalid", "cannot be used", c.note or "it has no valid answer", ERROR)
@@ -186,9 +197,11 @@ def _proposed(
     title = "not diagnosed yet" if lasting.keys() <= {"not_diagnosed", "approval"} else "held back"
     more = f" (and {len(rest) - 1} more)" if len(rest) > 1 else ""
     cure = next((what for name, what in TO_DO.items() if name in lasting), "")
-    todo = further or ("approve it if that is all right" if proposal.approvable else cure)
+    asks = proposal.approvable and "imu_stuck" not in lasting
+    todo = further or ("approve it if that is all right" if asks else cure)
     title = f"{approved}but {title}" if approved else title
-    return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", WARNING, todo)
+    severity = ERROR if "imu_stuck" in lasting else WARNING
+    return _state("held_back", title, f"{known}; not written: {rest[0]}{more}", severity, todo)
 
 
 def _missing(now: Circumstances) -> str:

@@ -6,7 +6,7 @@ import { brief, capital, fixed, plain, policyInWords } from "./words.js";
 
 const TOKEN_KEY = "onboard token";
 const WAIT_MS = 15000;
-const DIAGNOSIS = ["physics_missing", "not_diagnosed"]; // reasons that a person lifts by saying so explicitly
+const DIAGNOSIS = ["physics_missing", "imu_stuck", "not_diagnosed"]; // reasons that a person lifts by saying so explicitly
 
 const QUESTIONS = {
   approve: (imus) => [`Write the new values for ${imus}?`, "They are written as soon as policy and flight state allow, read back, and watched in the next flight."],
@@ -44,6 +44,8 @@ export class Push {
     const doing = push.state === "idle" ? "" : ` Now: ${plain(push.state)}${push.active_imu ? `, IMU ${push.active_imu}` : ""}.`;
     const last = push.last_outcome ? ` Last time: ${push.last_outcome}` : "";
     say(byId("push-state"), `Policy: ${policyInWords(push.policy)}${approval}.${doing}${last}`);
+    const unfinished = push.unfinished ?? [];
+    renew(byId("unfinished"), unfinished, () => unfinished.map(notEnded));
     const states = new Map(imus.map(({ imu, state }) => [imu, state]));
     renew(byId("proposals"), [push.proposals, [...states]], () =>
       push.proposals.length
@@ -105,6 +107,8 @@ export class Push {
   /** What would be written, old and new, before it is asked for. */
   table(action, imus, proposal) {
     if (["approve", "override"].includes(action) && proposal) return [changesTable(proposal.changes)];
+    const half = action === "rollback" && (this.push.unfinished ?? []).find((one) => imus.includes(one.imu));
+    if (half) return [valuesTable(half.values, { now: this.parameters })];
     const written = action === "rollback" && (this.push.written ?? []).find((push) => push.in_force && imus.includes(push.imu));
     return written ? [valuesTable(written.values, { now: this.parameters })] : [];
   }
@@ -148,6 +152,31 @@ function same(proposal, title, state) {
     h("h3", { text: title }),
     h("p", { class: "soft", text: capital(`${state.sentence}.`) }),
     h("details", { "data-key": `same-${proposal.imu}` }, h("summary", { text: "The numbers" }), changesTable(proposal.changes)),
+  );
+}
+
+// A write that has not come to its end: which values are in force, and what to do.
+function notEnded(one) {
+  const decimals = ({ name }) => (name.includes("SCAL") ? 5 : 4);
+  const which = ({ before, written, now }) => (now === null ? "not known yet" : now === written ? "new" : now === before ? "old" : "somebody's");
+  return h(
+    "div",
+    { class: "unfinished", "data-imu": one.imu },
+    h("h3", { class: one.half === false ? "" : "bad", text: `IMU ${one.imu}: ${one.half ? "half a set is in force" : "a write was interrupted"}` }),
+    h("p", { text: capital(`${one.sentence}.`) }),
+    ...(one.next ? [h("p", { class: "bad", text: capital(`${one.next}.`) })] : []),
+    h("div", { class: "scroll" }, h(
+      "table",
+      { class: "changes" },
+      h("thead", {}, h("tr", {}, h("th", { scope: "col", text: "Parameter" }), ...["old", "new", "in force"].map((text) => h("th", { scope: "col", class: "number", text })))),
+      h("tbody", {}, ...one.values.map((value) => h(
+        "tr",
+        {},
+        h("td", { class: "name", text: value.name }),
+        ...[value.before, value.written].map((number) => h("td", { class: "number", text: fixed(number, decimals(value)) })),
+        h("td", { class: "number to", text: value.now === null ? which(value) : `${fixed(value.now, decimals(value))} (${which(value)})` }),
+      ))),
+    )),
   );
 }
 
