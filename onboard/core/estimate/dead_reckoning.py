@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import TypeAlias
+from weakref import ReferenceType, ref
 
 import numpy as np
 
@@ -30,6 +32,8 @@ from onboard.core.maths.frames import rotation_from_vector
 from onboard.core.maths.small_turns import turn_by
 from onboard.core.model.linearisation import Linearisation
 from onboard.core.model.quadrature import NodeMaker
+
+_Piece: TypeAlias = tuple[ReferenceType[Segment], ReferenceType[Fixes]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,14 +218,15 @@ class KnownIntervals:
     """Integrals of batches of flight, kept for the next time that the same are asked for.
 
     In flight an answer is worked out every now and then, and all but a batch or two are the ones of
-    before; a report asks for what the answer has asked for.  Of hours nothing is kept.
+    before; a report asks for what the answer has asked for.  Of hours nothing is kept, nor flight
+    that nobody else keeps.
     """
 
     __slots__ = ("_known", "_point")
 
     def __init__(self) -> None:
         self._point: Linearisation | None = None
-        self._known: dict[tuple[int, int], tuple[Segment, Fixes, Chain]] = {}
+        self._known: dict[tuple[int, int], tuple[_Piece, Chain]] = {}
 
     def __deepcopy__(self, memo: object) -> KnownIntervals:
         return KnownIntervals()  # whoever copies a flight asks once
@@ -234,13 +239,12 @@ class KnownIntervals:
             return intervals(pieces, point)
         for segment, fixes in pieces:
             key = id(segment), id(fixes)
-            # With what it is made of: of an object that is gone another may have the number.
-            self._known[key] = before.get(key) or (
-                segment,
-                fixes,
-                intervals([(segment, fixes)], point),
-            )
-        chains = [chain for _, _, chain in self._known.values()]
+            of, chain = before.get(key, (None, None))
+            # Of an object that is gone another may have the number.
+            if of is None or chain is None or of[0]() is not segment or of[1]() is not fixes:
+                of, chain = (ref(segment), ref(fixes)), intervals([(segment, fixes)], point)
+            self._known[key] = of, chain
+        chains = [chain for _, chain in self._known.values()]
         return Chain(*(np.concatenate([getattr(c, f.name) for c in chains]) for f in fields(Chain)))
 
 

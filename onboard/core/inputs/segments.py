@@ -40,7 +40,7 @@ QUICK = frozenset({"throttle", STEADY_THROTTLE})
 """Of these, what swings within a few of its samples."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Fixes:
     """GPS epochs with even times.
 
@@ -82,7 +82,7 @@ class Fixes:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Segment:
     """Inertial samples, attitude and slow signals, all on the boot clock, delays removed.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import fields, replace
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -68,6 +69,15 @@ def test_integrals_are_made_once(monkeypatch):
     for count in (1, 2, 2, 3):
         known.of(pieces[:count], Linearisation())
     assert [list(some) for some in made] == [[one] for one in pieces]
+
+
+def test_flight_that_nobody_keeps_is_not_kept():
+    known = KnownIntervals()
+    segment, fixes = piece(0.0)
+    known.of([(segment, fixes)], Linearisation())
+    gone = ref(segment), ref(fixes)
+    del segment, fixes
+    assert [of() for of in gone] == [None, None]
 
 
 def piece(start):
