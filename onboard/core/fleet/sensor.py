@@ -70,11 +70,15 @@ def alone(flight: FlightSix, prior: Prior) -> Alone:
         prior: of any sensor, about what was in force.
     """
     unit, said = prior.sigma, _in_units(flight, prior)
-    A = said.N + np.eye(6) / WIDE**2
-    linear = prior.center + unit * np.linalg.solve(A, said.b)
-    J = parameters_jacobian(linear)
-    P = J @ (np.linalg.inv(A) * np.outer(unit, unit)) @ J.T
-    value, sigma = parameters_of(linear), np.sqrt(np.maximum(np.diag(P), 0.0))
+    usual, wide = (
+        prior.center + unit * np.linalg.solve(said.N + np.eye(6) / width**2, said.b)
+        for width in (1.0, WIDE)
+    )
+    # An offset is beta over a scale: not over one that nobody knows, which may be near nothing.
+    J = parameters_jacobian(usual)
+    covariance = np.linalg.inv(said.N + np.eye(6) / WIDE**2) * np.outer(unit, unit)
+    value = parameters_of(usual) + J @ (wide - usual)
+    sigma = np.sqrt(np.maximum(np.diag(J @ covariance @ J.T), 0.0))
     known = np.isfinite(value) & (sigma > 0.0) & (sigma < PRIOR_SHARE * unit)
     return Alone(np.where(known, value, np.nan), np.where(known, sigma, np.nan))
 

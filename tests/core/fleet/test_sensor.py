@@ -44,6 +44,19 @@ def test_a_number_that_the_flight_does_not_know_has_no_value():
     assert list(np.isfinite(seen.value)) == [True, True, False, True, True, False]
 
 
+@pytest.mark.parametrize("scale", [0.2, 3.0])
+def test_an_offset_is_not_over_a_scale_that_the_flight_does_not_know(scale):
+    """Beta is known to 0.3 or 0.1 m/s^2, the scale to nothing, and by chance far off."""
+    far = TRUE.copy()
+    far[0], far[3] = scale, TRUE[3] * TRUE[0] / scale
+    dim = alone(flight(far, [1.0, 0.002, 0.003, 0.3, 0.02, 0.03]), prior())
+    seen = alone(flight(far, [1.0, 0.002, 0.003, 0.1, 0.02, 0.03]), prior())
+    assert list(np.isfinite(dim.value)) == [False, True, True, False, True, True]
+    assert list(np.isfinite(seen.value)) == [False, True, True, True, True, True]
+    assert seen.sigma[3] == pytest.approx(np.hypot(0.1, TRUE[3]), rel=0.1)
+    assert abs(seen.value[3] - TRUE[3]) < 2.0 * seen.sigma[3]
+
+
 def test_merged_is_the_weighted_mean_and_never_surer_than_the_floor():
     rng = np.random.default_rng(1)
     flights = [
