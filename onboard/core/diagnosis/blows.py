@@ -23,8 +23,9 @@ from onboard.core.inputs.segments import Batch
 from onboard.core.maths.arrays import Array
 
 POLE = 2.0 * np.pi * VIBRATION_HZ
+"""Of the low-pass, 1/s [data sheet]."""
 LEFT = 1e-12
-"""Of a blow, so long after it that it may have been anything."""
+"""Of a blow, two seconds after it: of what is longer ago no report says anything [physics]."""
 
 
 class Blows:

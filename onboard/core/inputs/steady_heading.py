@@ -36,12 +36,13 @@ from onboard.core.maths.frames import (
     vector_from_rotation,
 )
 
-DELAYS_S = ATTITUDE_LATE_S * np.linspace(-2.0, 2.0, 41)
-"""By which an attitude may be late, s: to two sigma of what is expected."""
-UNLIKELY = np.where(
-    np.abs(DELAYS_S) > 1e-9, 0.5 * (DELAYS_S / ATTITUDE_LATE_S) ** 2 + np.log(len(DELAYS_S)), 0.0
-)
-"""Their surprise, nats: as likely as that one of them is there is that none is."""
+SIGMAS = np.arange(-20, 21) / 10.0
+"""Of a delay, that are asked: to two of what is expected [probability], and so near to each other
+that what lies between two of them is 10 ms off at the most [cost]."""
+DELAYS_S = ATTITUDE_LATE_S * SIGMAS
+"""By which an attitude may be late, s."""
+UNLIKELY = np.where(SIGMAS == 0.0, 0.0, 0.5 * SIGMAS**2 + np.log(len(SIGMAS)))
+"""Their surprise, nats: that one of them is there is as likely as that none is [probability]."""
 
 
 class SteadyHeading:

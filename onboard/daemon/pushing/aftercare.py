@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Mapping
 
+from onboard.daemon.pushing import limits
 from onboard.daemon.pushing.ledger import IMUS, Ledger
 from onboard.daemon.view.notices import Notices
 from onboard.push.entries import (
@@ -39,8 +40,6 @@ from onboard.push.entries import (
 from onboard.push.signals import Reason
 
 ASKED = "a person had it put back"
-LATE_LOOKS = 3
-"""Looks, once a second, at which it has to be so: who sets the same six from a file takes time."""
 
 
 class Aftercare:
@@ -160,7 +159,7 @@ class Aftercare:
                 self._late.pop(imu, None)
                 continue
             self._late_looks[imu] += 1
-            if self._late_looks[imu] == LATE_LOOKS:
+            if self._late_looks[imu] == limits.LATE_LOOKS:
                 self._late[imu] = Recovery.undoing(undone, ASKED)
                 again = [c.name for c in undone.plan.changes if values[c.name] != c.before]
                 text = (

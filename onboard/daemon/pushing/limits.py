@@ -37,6 +37,9 @@ RESUMED_AFTER_S: Final = (2.0, 5.0, 10.0, 30.0, 60.0)
 """s between a transaction that is left open and the next try to end it: half a set may be in force,
 and whoever stands by the vehicle may arm at any moment; one try asks for 20 s on a line that does
 not answer [cost]."""
+LATE_LOOKS: Final = 3
+"""Looks, once a second, at which values that were taken back have to be there again in part before
+it is said: a station that sets the same six from a file takes a second or two for them [use]."""
 MOVED_SIGMAS: Final = 2.0
 """An approval is of the values shown: it lapses when an estimate moves by more than so many of its
 standard deviations [probability: 5 %]."""
