@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,13 @@ from benchmarks.real.beside import NOTHING, Beside, beside
 from benchmarks.real.offer import Offer, offer_of
 from benchmarks.real.split import RealFlight
 from benchmarks.real.whiteness import Whiteness, whiteness
+from onboard.answers.answer import Answer
 from onboard.answers.answer import judged as answered
-from onboard.answers.recorded import Recorded
+from onboard.answers.recorded import KEEPING_ALL, Recorded
+from onboard.answers.together import together
 from onboard.core.diagnosis.evidence import Judge
 from onboard.core.diagnosis.procedure import examine
+from onboard.core.estimate.comparison import compare
 from onboard.core.estimate.dead_reckoning import Chain, intervals
 from onboard.core.estimate.engine import Engine
 from onboard.core.estimate.mean_force import in_the_mean
@@ -93,6 +97,7 @@ class Fit:
             there is none.
         rest: (3,) the force on the ground with the parameters in force, sensor axes, m/s^2; NaN
             where the vehicle was not seen standing.
+        given: its answer by itself, with the ``parameters`` of its recording.
         offer: what a person is told to set; None if there is no estimate.
     """
 
@@ -127,6 +132,8 @@ class Fit:
     beside: Beside = NOTHING
     whole: Calibration | None = None
     rest: Array = field(default_factory=lambda: np.full(3, np.nan))
+    given: Answer | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
     offer: Offer | None = None
 
     @property
@@ -219,6 +226,8 @@ def fitted(flight: RealFlight, imu: int, samples: Sequence[Sample]) -> Fit:
         beside=beside(engine, MOVING_M_S, flight.ends_s),
         whole=in_the_mean(c, engine),
         rest=recorded.calibrator.parameters.R_bs.T @ resting_force(samples, imu),
+        given=given,
+        parameters=dict(recorded.calibrator.parameters.values),
         offer=offer_of(given, recorded.calibrator.parameters.values),
     )
 
@@ -286,12 +295,40 @@ def resting_force(samples: Sequence[Sample], imu: int) -> Array:
 
 
 def fits(flights: Sequence[RealFlight], jobs: int = 1) -> list[Fit]:
-    """Every accelerometer of every flight, in order; ``jobs`` processes."""
+    """Every accelerometer of every flight, in order; ``jobs`` processes.
+
+    What is offered of each is by all of its flight.
+    """
     wanted = [(f, imu) for f in flights for imu in f.imus]
     if jobs <= 1:
-        return [fit(f, imu) for f, imu in wanted]
-    with ProcessPoolExecutor(max_workers=jobs) as pool:
-        return list(pool.map(fit, *zip(*wanted, strict=True)))
+        made = [fit(f, imu) for f, imu in wanted]
+    else:
+        with ProcessPoolExecutor(max_workers=jobs) as pool:
+            made = list(pool.map(fit, *zip(*wanted, strict=True)))
+    by_flight = groupby(made, key=lambda f: f.flight)
+    return [f for _, some in by_flight for f in with_each_other(list(some))]
+
+
+def with_each_other(made: list[Fit]) -> list[Fit]:
+    """The accelerometers of a flight, with what is offered of each by all of them."""
+    whole = [f.whole for f in made if f.whole is not None]
+    if len(whole) < 2:
+        return made
+    comparison = compare(whole, ({f.imu: f.batches for f in made},))
+    answers = together(
+        [f.given for f in made if f.given is not None], comparison, KEEPING_ALL.needs
+    )
+    told = {a.imu: a for a in answers}
+    return [
+        f
+        if f.imu not in told
+        else replace(
+            f,
+            status=told[f.imu].calibration.status.value,
+            offer=offer_of(told[f.imu], f.parameters),
+        )
+        for f in made
+    ]
 
 
 def _failed(flight: RealFlight, imu: int, why: str) -> Fit:

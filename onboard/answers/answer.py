@@ -203,10 +203,9 @@ def diagnosed(given: Answer, document: Mapping[str, Any], *, resumed: bool = Fal
 
 def _refused(diagnosis: Diagnosis) -> Diagnosis:
     """A diagnosis that no model supports: nor do its numbers say anything, for the same reason."""
-    c = diagnosis.calibration
-    if c.status is not Status.CALIBRATED:
-        return diagnosis
-    c = replace(c, status=Status.INSUFFICIENT, note=diagnosis.note or c.note)
+    c = replace(diagnosis.calibration, believed=False)
+    if c.status is Status.CALIBRATED:
+        c = replace(c, status=Status.INSUFFICIENT, note=diagnosis.note or c.note)
     return replace(diagnosis, calibration=c)
 
 

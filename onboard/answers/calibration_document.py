@@ -20,12 +20,13 @@ class WorthDocument(msgspec.Struct, frozen=True, kw_only=True):
 
     ``directions`` of six are determined.  The specific force over the loads flown changes by
     ``change_m_s2`` (root mean square); its expected error falls from ``before`` to ``after``; it is
-    better with the ``probability``.
+    better with the ``probability``.  ``imus`` are the accelerometers whose knowledge it is.
     """
 
     scale: Numbers
     offset: Numbers
     directions: int
+    imus: list[int]
     change_m_s2: float
     error_before_m_s2: float
     error_after_m_s2: float
@@ -93,6 +94,7 @@ def worth_document(calibration: Calibration) -> WorthDocument | None:
         scale=numbers(found.six.scale),
         offset=numbers(found.six.offset),
         directions=found.directions,
+        imus=list(calibration.together.imus if calibration.together else (calibration.imu,)),
         change_m_s2=found.change,
         error_before_m_s2=found.error_before,
         error_after_m_s2=found.error_after,

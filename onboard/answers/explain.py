@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,9 @@ from onboard.answers.flown_order import in_order
 from onboard.answers.one_flight import no_answer
 from onboard.answers.recorded import Recorded, unanswered
 from onboard.answers.replay import Reading, read
+from onboard.answers.together import takes_part
 from onboard.core.diagnosis.records import Diagnosis
+from onboard.core.physics.wording import listed
 from onboard.recordings.recording import Recording
 
 
@@ -103,4 +105,15 @@ def explain(
     if (apart := recorded.contradiction(imu)) is not None:
         given = no_answer(given, apart, distinct([r.path for r in source.recordings]))
     chosen = (f"{r.path.name}: {note}" for r in source.recordings for note in r.notes)
-    return Explanation(given, source, recorded.parameters, (*flown.notes, *chosen))
+    beside = _beside(given, sorted({*source.vehicle.imus} - {imu}))
+    return Explanation(given, source, recorded.parameters, (*flown.notes, *chosen, *beside))
+
+
+def _beside(given: Answer, others: Sequence[int]) -> Iterator[str]:
+    """That others felt the flight, too, where that would count."""
+    if others and takes_part(given):
+        who = f"accelerometer{'s' if len(others) > 1 else ''} {listed([str(n) for n in others])}"
+        yield (
+            f"{who} felt the same flight, and this is by accelerometer {given.imu} alone: what to "
+            "set by all of them, onboard replay says"
+        )

@@ -207,7 +207,8 @@ class Recorded:
                 parameters_known=parameters.known(imu),
                 coverage=Coverage(0.0, (0.0,) * 6, "", SEE_TO_NUMBERS),
             )
-        return replace(plain, status=Status.INSUFFICIENT, note=f"{why}. {plain.note}".rstrip())
+        note = f"{why}. {plain.note}".rstrip()
+        return replace(plain, status=Status.INSUFFICIENT, believed=False, note=note)
 
     def _with_rest(self, found: Diagnosis) -> Diagnosis:
         """With what the accelerometer reads at rest, which is no part of its estimate."""

@@ -14,10 +14,11 @@ from onboard.answers.answer import Answer
 from onboard.answers.calibration_document import advice_document
 from onboard.answers.compared import accelerometers_document, remarks
 from onboard.answers.flight_document import FlightsDocument, flight_document
-from onboard.answers.recorded import unanswered
+from onboard.answers.recorded import KEEPING_ALL, unanswered
 from onboard.answers.recorded_vehicle import Vehicle
 from onboard.answers.replay_document import RecordingDocument, ReplayDocument, imu_document
 from onboard.answers.same_flight import refuse_copies, refuse_one_flight_twice, refuse_other_boards
+from onboard.answers.together import together
 from onboard.core.estimate.comparison import Comparison
 from onboard.core.estimate.result import Calibration
 from onboard.core.inputs.blocks import Block
@@ -204,8 +205,9 @@ def replay(
     answers = tuple(
         estimator.answer(n) if n in answered else unanswered(vehicle.unanswered(n)) for n in wanted
     )
-    quiet = () if imu is not None else sorted({*vehicle.imus} - {*wanted})
     compared = estimator.compared([a.calibration for a in answers]) if len(answers) > 1 else None
+    answers = together(answers, compared, KEEPING_ALL.needs)
+    quiet = () if imu is not None else sorted({*vehicle.imus} - {*wanted})
     notes = (*map(vehicle.silence, quiet), *remarks(compared))
     return Replay(source.recordings, answers, vehicle.counts, notes, estimator.parameters, compared)
 

@@ -4,11 +4,13 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from onboard.answers.answer import Answer, diagnosed
 from onboard.core.diagnosis.cleared import since_reboot
 from onboard.core.diagnosis.records import Verdict
+from onboard.core.estimate.determined import force_moments
 from onboard.core.estimate.result import Status
 from onboard.core.estimate.settings import CalibratorSettings
 from onboard.core.inputs.samples import ImuSample, ParameterValue, VehicleState
@@ -141,6 +143,28 @@ def judge(one):
     while learned.diagnosing:
         learned = one.examine()
     return learned
+
+
+@pytest.mark.slow
+def test_each_is_judged_with_what_the_others_felt(flight, tmp_path, believed, monkeypatch):
+    one = learner(tmp_path / "one")
+    one.learn(flight, judging=())
+    judged = {imu: j.diagnosed.calibration for imu, j in judge(one).flight.imus.items()}
+    assert {imu: c.together.imus for imu, c in judged.items()} == {1: (1, 2), 2: (1, 2)}
+    for c in judged.values():
+        load = force_moments(c.load_mean, c.load_square, c.in_force_scale + c.in_force_offset)
+        assert np.sum(load * c.best[1]) <= np.sum(load * c.with_its_gyroscope)
+    # One whose six were another's for a part of the flight has no say.
+    lacking = {2: "it jumps"}
+    monkeypatch.setattr(
+        examiner_module,
+        "diagnosed",
+        lambda given, _: replace(diagnosed(given, {}), missing=lacking.get(given.imu, "")),
+    )
+    other = learner(tmp_path / "other")
+    other.learn(flight, judging=())
+    for j in judge(other).flight.imus.values():
+        assert j.diagnosed.calibration.together is None
 
 
 @pytest.mark.slow

@@ -38,7 +38,7 @@ PAIR = PairDifference(
     windows=311,
 )
 JOINT = Joint((1, 2), np.zeros((2, 6)), np.ones((2, 6)), np.eye(12))
-COMPARISON = Comparison((PAIR,), JOINT, (CommonChange(0, -0.11, 0.01, 0.002),), 2)
+COMPARISON = Comparison((PAIR,), JOINT, (CommonChange(0, -0.11, 0.01, 0.002),), 2, ())
 FILE = Recording(Path("a.BIN"), "dataflash", "ardupilot", 311.0, {}, iter)
 BOTH = tuple(map(unanswered, (CALIBRATED, replace(CALIBRATED, imu=2))))
 
@@ -80,7 +80,7 @@ def test_one_that_all_others_see_elsewhere_is_named_alone():
         replace(PAIR, imus=(2, 3), distance=(0.0, 0.0, 0.25)),
     )
     joint = Joint((1, 2, 3), np.zeros((3, 6)), np.ones((3, 6)), np.eye(18))
-    (note,) = remarks(Comparison(pairs, joint, (), 2))
+    (note,) = remarks(Comparison(pairs, joint, (), 2, ()))
     assert note.startswith("accelerometer 3 is -0.24 m in z from where INS_POS3 has it")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +92,8 @@ RECORDINGS = ("sitl/c01.BIN", "real/real-fixedwing-02.BIN")  # streams are simul
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_recordings_have_one_answer(recordings, name):
+    """By itself; what others add to it a replay, which has asked them, knows more of."""
     theirs = replayed(recordings / name).answers[0]
     ours = explained(recordings / name).answer
-    assert repr(ours.calibration) == repr(theirs.calibration)  # what is no number is equal, too
+    alone = replace(theirs.calibration, together=None)
+    assert repr(ours.calibration) == repr(alone)  # what is no number is equal, too

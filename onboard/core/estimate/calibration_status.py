@@ -48,9 +48,11 @@ def judged(
         return replace(made, note=f"{doubt}. {made.note}")
     if not engine.moving:
         made = replace(made, note=f"{HOVERED}. {made.note}".rstrip())
-    if engine.trusted_s < engine.settings.minimum_s or not good_enough(made, engine.settings.needs):
+    if engine.trusted_s < engine.settings.minimum_s:
         return made
-    return replace(made, status=Status.CALIBRATED)
+    made = replace(made, believed=True)
+    done = good_enough(made, engine.settings.needs)
+    return replace(made, status=Status.CALIBRATED) if done else made
 
 
 def doubt_of(engine: Engine, solution: Solution) -> str:

@@ -63,12 +63,14 @@ class Comparison:
         joint: all of them together.
         common: changes of an offset that all of them ask for.
         vertical: axis along gravity in level flight, 0, 1 or 2.
+        relatives: every two of them, as :attr:`pairs`, with the sums.
     """
 
     pairs: tuple[PairDifference, ...]
     joint: Joint
     common: tuple[CommonChange, ...]
     vertical: int
+    relatives: tuple[Relative, ...]
 
 
 def compare(
@@ -110,7 +112,7 @@ def compare(
     least = float((needs or Needs()).target[3])
     common = common_changes(found, least) if known else ()
     vertical = int(np.argmax(np.abs(relatives[0].mean_force)))
-    return Comparison(tuple(pairs), found, common, vertical)
+    return Comparison(tuple(pairs), found, common, vertical, tuple(relatives))
 
 
 def _flew(imu: int, flights: Sequence[Mapping[int, Sequence[Batch]]]) -> bool:

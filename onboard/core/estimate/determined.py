@@ -109,8 +109,7 @@ def improvement(
     Raises:
         ValueError: the covariance is not finite, symmetric and positive definite.
     """
-    x = np.array((*calibration.scale, *calibration.offset))
-    P = _checked(x, calibration.with_its_gyroscope)
+    x, P = _checked(*calibration.best)
     k = np.asarray(in_force, dtype=np.float64)
     M = force_moments(calibration.load_mean, calibration.load_square, k)
     d = np.asarray(wanted, dtype=np.float64) - k
@@ -134,9 +133,8 @@ def determine(calibration: Calibration, in_force: Sequence[float]) -> Determined
     Raises:
         ValueError: the covariance is not finite, symmetric and positive definite.
     """
-    x = np.array((*calibration.scale, *calibration.offset))
+    x, P = _checked(*calibration.best)
     k = np.asarray(in_force, dtype=np.float64)
-    P = _checked(x, calibration.with_its_gyroscope)
     prior = np.array(calibration.prior_sigma)
     known = np.sqrt(np.diag(P)) <= PRIOR_SHARE * prior
     contradicted = (x - k) ** 2 > CHI_SQUARE_999[1] * np.diag(P)
@@ -198,8 +196,8 @@ def force_moments(
     return M
 
 
-def _checked(x: Array, P: Array) -> Array:
-    """``P`` if it is a covariance.
+def _checked(x: Array, P: Array) -> tuple[Array, Array]:
+    """Both, if ``P`` is a covariance.
 
     Raises:
         ValueError: it is not finite, symmetric and positive definite.
@@ -212,7 +210,7 @@ def _checked(x: Array, P: Array) -> Array:
     unit = np.sqrt(diagonal)  # scales and offsets differ by orders of magnitude: normalise
     if np.linalg.eigvalsh(P / np.outer(unit, unit))[0] <= 0.0:
         raise ValueError("covariance is not positive definite")
-    return P
+    return x, P
 
 
 def _combination_known(P: Array, prior: Array) -> NDArray[np.bool_]:

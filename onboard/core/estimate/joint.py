@@ -135,12 +135,24 @@ def joint(singles: Sequence[Single], relatives: Sequence[Relative]) -> Joint:
         relatives: pairs of them, all there are or some.
     """
     n = len(singles)
+    return stacked(singles, relatives, np.full(n, 1.0 / n))
+
+
+def stacked(singles: Sequence[Single], relatives: Sequence[Relative], weights: Array) -> Joint:
+    """The same with shares of each accelerometer's information that need not be equal.
+
+    Args:
+        singles: at least one.
+        relatives: pairs of them, all there are or some.
+        weights: (n,) not negative; the sum is one.
+    """
+    n = len(singles)
     place = {s.imu: slice(6 * i, 6 * i + 6) for i, s in enumerate(singles)}
     N, b = np.zeros((6 * n, 6 * n)), np.zeros(6 * n)
-    for s in singles:
+    for s, weight in zip(singles, weights, strict=True):
         cut = place[s.imu]
-        N[cut, cut] += s.information / n + np.diag(s.prior_sigma**-2.0)
-        b[cut] += s.vector / n
+        N[cut, cut] += weight * s.information + np.diag(s.prior_sigma**-2.0)
+        b[cut] += weight * s.vector
     for r in relatives:
         both = np.r_[place[r.imus[0]], place[r.imus[1]]]
         N[np.ix_(both, both)] += 2.0 / n * r.information

@@ -61,6 +61,7 @@ def merged_calibration(
     made = replace(
         made,
         status=Status.INSUFFICIENT,
+        believed=True,
         observable=seen.observed,
         note=seen.note,
         in_force_scale=in_force.scale,

@@ -20,7 +20,7 @@ offset more than a gain.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -112,6 +112,17 @@ class Relative:
         """(3,) mean force of a, m/s^2."""
         out: Array = self.theta[:3] * self.mean_raw[0] + self.theta[3:6]
         return out
+
+    def loosened(self, sigma: Array) -> Relative:
+        """The pair where each of its two has an error of its own beside.
+
+        Args:
+            sigma: (12,) of it, in scale (1) and beta (m/s^2) of a, then of b.
+        """
+        spoilt = np.eye(12) + self.information @ np.diag(sigma**2)
+        information = np.asarray(np.linalg.solve(spoilt, self.information), np.float64)
+        vector = np.asarray(np.linalg.solve(spoilt, self.vector), np.float64)
+        return replace(self, information=(information + information.T) / 2, vector=vector)
 
     def other(self, a: Array, prior_sigma: Array) -> tuple[Array, Array]:
         """What b is if a is known: (6,) scale and beta, and their covariance (6, 6).

@@ -88,6 +88,23 @@ class AtRest:
 
 
 @dataclass(frozen=True, slots=True)
+class Together:
+    """One accelerometer as all of its vehicle know it, fitting its own gyroscope's axes.
+
+    Attributes:
+        imus: whose knowledge it is, its own among them.
+        scale: (3,) 1.
+        offset: (3,) m/s^2, sensor axes.
+        covariance: (6, 6) of both.
+    """
+
+    imus: tuple[int, ...]
+    scale: Vector3
+    offset: Vector3
+    covariance: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
     """The answer for one accelerometer.
 
@@ -106,6 +123,9 @@ class Calibration:
     the sensor, however many there are.
     ``load_mean`` and ``load_square`` are the means of the raw samples and of their squares, sensor
     axes: the loads that were flown, of which the six should give the force.
+    ``believed``: nothing contradicts its sigmas, and there is flight enough.  ``together`` is what
+    the vehicle's other accelerometers add (:mod:`onboard.core.estimate.with_others`): only what is
+    to be set comes of it.
     """
 
     imu: int
@@ -141,6 +161,8 @@ class Calibration:
     dead_reckoning: DeadReckoning | None = None
     at_rest: AtRest | None = None
     temperature: Estimate | None = None
+    believed: bool = False
+    together: Together | None = None
     extra: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -152,6 +174,13 @@ class Calibration:
         out: Array = np.array(self.covariance, dtype=np.float64)
         out -= np.diag(np.square(self.gyro_sigma))
         return out
+
+    @property
+    def best(self) -> tuple[Array, Array]:
+        """(6,) and (6, 6) all that is known of the six with its gyroscope: what can be set."""
+        if (all_say := self.together) is not None:
+            return np.array(all_say.scale + all_say.offset), np.array(all_say.covariance)
+        return np.array(self.scale + self.offset), self.with_its_gyroscope
 
     @property
     def sigma_with_its_gyroscope(self) -> Array:
@@ -177,6 +206,7 @@ class Calibration:
             covariance=tuple(map(tuple, np.diag(np.square(self.prior_sigma)).tolist())),
             observable=(False,) * 6,
             note=f"{why}. {self.note}".rstrip(),
+            believed=False,
         )
 
     @classmethod

@@ -90,6 +90,12 @@ def treated_of(name: str) -> str:
     return (kind_of(name) or Effect).treated
 
 
+def adds_to_force(name: str) -> bool:
+    """Whether the six are not all that makes the force beside it; of one that nobody knows, yes."""
+    kind = kind_of(name)
+    return kind is None or kind.acceleration is not Effect.acceleration
+
+
 def size_of(found: Finding) -> str:
     """The size in a few words; empty where there is nothing finite to say."""
     if not math.isfinite(sum(q.value for q in found.unknowns.values())):

@@ -27,12 +27,16 @@ import numpy as np
 from onboard.answers.answer import Answer, answer, diagnosed
 from onboard.answers.explain_document import explain_document
 from onboard.answers.knowledge import determined
+from onboard.answers.together import judged as status_of
+from onboard.answers.together import six_are_all
 from onboard.core.diagnosis.cleared import since_reboot
 from onboard.core.diagnosis.records import Diagnosis, Verdict
 from onboard.core.estimate.calibrator import Calibrator
+from onboard.core.estimate.comparison import compare
 from onboard.core.estimate.result import Calibration, Status
 from onboard.core.estimate.saving import SavedEngine
 from onboard.core.estimate.solution import Solution, solve
+from onboard.core.estimate.with_others import with_others
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.segments import Batch
 from onboard.core.maths.accelerometer import parameters_jacobian, parameters_of
@@ -159,7 +163,7 @@ class Examiner:
         if frozen.waiting:
             return None
         self._frozen = None
-        flight = JudgedFlight(frozen.support, frozen.imus, frozen.current)
+        flight = JudgedFlight(frozen.support, _with_each_other(frozen), frozen.current)
         return Examined(flight, tuple(frozen.flight.sums), frozen.changed, frozen.failed)
 
     def _freeze(self, flight: Calibrator) -> None:
@@ -246,6 +250,32 @@ def changed_on_the_ground(
         if before and after and before[-1] - edge <= at <= after[0] + edge:
             return after[0]
     return None
+
+
+def _with_each_other(frozen: Frozen) -> dict[int, Judged]:
+    """What was found of each accelerometer, with what the others add to it.
+
+    One that was changed between two flights did not fly all of it with the others.
+    """
+    flight, judged = frozen.flight, frozen.imus
+    found = {imu: j.diagnosed for imu, j in judged.items() if imu not in frozen.changed}
+    those = [
+        d.calibration for d in found.values() if six_are_all(d.calibration, d.missing, d.effects)
+    ]
+    if len(those) < 2:
+        return judged
+    flown = {c.imu: since_reboot(flight.engine(c.imu).batches) for c in those}
+    try:
+        comparison = compare(those, (flown,))
+        known = {} if comparison is None else with_others(those, comparison)
+    except (ArithmeticError, ValueError):  # numbers that no model fits
+        return judged
+    needs = flight.settings.needs
+    out = dict(judged)
+    for imu, c in known.items():
+        calibration = status_of(c, needs)
+        out[imu] = replace(out[imu], diagnosed=replace(found[imu], calibration=calibration))
+    return out
 
 
 def _alone(c: Calibration) -> Calibration:
