@@ -143,11 +143,17 @@ def _unclipped(flight: list[Batch], rail: Finding, t0: float) -> list[Batch] | N
 def _without_spikes(
     asked: Asked, batches: Sequence[Batch], full: Examination
 ) -> tuple[Examination, Sequence[Batch], Finding | None]:
-    """The flight without samples that its velocities know nothing of, or as it is."""
+    """The flight without samples that its velocities know nothing of, or as it is.
+
+    Likelihoods at their highest are compared, and noise and timing may have several of them.  So
+    they are looked for from where the flight as it was read has them, too; not only from there, for
+    what smooths may have been found for the sake of these very samples.
+    """
     spiked = spikes_of(batches)
     if spiked is None or not _matter(spiked, batches, full, asked.engine):
         return full, batches, None
-    without = felt(asked, spiked.batches)
+    starts = (asked, replace(asked, beside=full))
+    without = max((felt(a, spiked.batches) for a in starts), key=lambda e: e.log_likelihood)
     better = 2.0 * (without.log_likelihood - full.log_likelihood)
     if better <= CLEARLY:
         return full, batches, None
