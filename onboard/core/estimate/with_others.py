@@ -1,8 +1,8 @@
 """What a vehicle's other accelerometers add to what is known of one: all that can be set of it.
 
 They feel one trajectory, so whatever one of them knows by GPS the next one knows through their
-difference (:mod:`onboard.core.estimate.relative`): one that vibrates, or clips, or came in too
-seldom, learns from one that does not.
+difference (:mod:`onboard.core.estimate.relative`): one that is shaken, or came in too seldom,
+learns from one that is not.
 
 *Which six.*  What is to be set fits the accelerometer to the axes of its own gyroscope, for those
 turned what it felt (:func:`~onboard.core.estimate.gyro_axes.gyro_sigma`).  Their difference is
