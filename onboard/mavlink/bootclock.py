@@ -50,7 +50,9 @@ class BootClock:
     wants to know the time may ask the one clock that there is.  A stamp that is far from those
     before it, on either side, moves nothing before the next one agrees with it: one that is late,
     or damaged, or repeated as it stands, is neither a reboot nor a leap of the clock.  A reboot is
-    told with its second stamp, and both of damage that chance lets pass must be in a row.
+    told with its second stamp, and both of damage that chance lets pass must be in a row.  A boot
+    after the last stamp that was heard cannot be older than that is ago: stamps of older ones are
+    packets that were held back, or somebody else's, as long as the clock itself goes on.
 
     After a silence a clock that has begun anew may be ahead of all that was heard before.  But both
     clocks go at the same rate: one that has gone on for less than ours by more than a link can
@@ -70,6 +72,7 @@ class BootClock:
         self._silence: tuple[float, float, float, float] | None = None
         self._unix_offset: float | None = None
         self._paired = False
+        self._now: float | None = None
 
     def begin_anew(self) -> None:
         """It is another autopilot from here on."""
@@ -89,6 +92,11 @@ class BootClock:
             return False
         return now - self._heard[1] <= LONGEST_DELAY_S
 
+    def doubts(self, t: float) -> bool:
+        """Whether a stamp, s, is of no boot that was told: far from the newest, on either side."""
+        latest = self.latest
+        return latest is not None and (began_anew(t, latest) or far_ahead(t, latest))
+
     def observe(self, message: Message, now: float | None = None) -> bool:
         """Take note of the time that a message tells; whether that confirms a reboot.
 
@@ -98,7 +106,7 @@ class BootClock:
             message: of the autopilot.
             now: our own monotonic clock, s, where there is one: a recording has none.
         """
-        number, before = message.get_msgId(), self.reboots
+        number, before, self._now = message.get_msgId(), self.reboots, now
         stamp = None if now is None else self._stamp(message)
         if stamp is not None and now is not None and self._is_of_another(stamp, now):
             return False
@@ -232,10 +240,24 @@ class BootClock:
         latest, suspect = self.latest, self._suspect
         if latest is None or not began_anew(t, latest):
             self._go_on(t)
-        elif suspect is not None and 0.0 < abs(t - suspect) < LONGEST_DELAY_S:
+        elif (
+            suspect is not None
+            and 0.0 < abs(t - suspect) < LONGEST_DELAY_S
+            and self._may_have_booted(t)
+        ):
             self._begins_anew(t)
         else:
             self._suspect = t
+
+    def _may_have_booted(self, t: float) -> bool:
+        """Whether a boot of ``t`` s ago fits in the time since the last stamp was heard.
+
+        Where the clock has fallen silent it is not asked how fast another one goes (a simulator's).
+        """
+        if self._now is None or self._heard is None:
+            return True
+        silent = self._now - self._heard[1]
+        return silent > limits.FAILOVER_S or t <= silent + LONGEST_DELAY_S
 
     def _go_on(self, t: float) -> None:
         """A stamp that is not of another boot: where it leaps ahead, the next one has to as well.

@@ -253,13 +253,15 @@ class TrustWindow:
         """A fix older than the one before; many in a row say that *that* one was far ahead.
 
         Only those that are later than a link can make them: one that repeats and reorders brings
-        any number of fixes after a newer one.
+        any number of fixes after a newer one.  And not where the one before has just come in time:
+        they are a line's that has held them back.
         """
         self._ledger.count(Distrust.STALE)
         if not began_anew(t, last):
             return ()
         self._late += 1
-        if self._late < LATE_IN_A_ROW:
+        in_time = 0.0 <= self._felt_at - last <= self._limits.gap
+        if self._late < LATE_IN_A_ROW or in_time:
             return ()
         events = self._close(last, Distrust.STALE)
         self._plausibility.reset()

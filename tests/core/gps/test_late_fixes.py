@@ -57,6 +57,23 @@ def test_a_receiver_that_repeats_its_last_fix_is_not_late():
     assert [e.reason for e in events if isinstance(e, WindowClosed)] == [Distrust.STALE]
 
 
+@pytest.mark.parametrize("count", [1, 5, 60])
+def test_what_a_line_has_held_back_closes_nothing_where_others_come_in_time(count):
+    window = TrustWindow()
+    listened(window, lambda _: 0.1, end=130.0)
+    for k in range(count):
+        assert window.feed(fix(100.0 + 0.2 * k)) == ()
+    assert listened(window, lambda _: 0.1, start=130.0, end=150.0) == []
+    assert window.is_open
+
+
+def test_fixes_that_are_late_from_some_moment_on_are_told_as_that():
+    window = TrustWindow()
+    events = listened(window, lambda t: 0.1 if t < 130.0 else 20.0)
+    assert [type(e) for e in events] == [WindowOpened, WindowClosed]
+    assert window.reason is Distrust.LATE
+
+
 @pytest.mark.parametrize("late", [70.0, 900.0])
 def test_fixes_by_another_clock_are_told_as_late_and_not_as_none(late):
     calibrator = Calibrator()
