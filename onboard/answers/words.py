@@ -46,6 +46,7 @@ DISTRUST = {
     "ekf_unhealthy": "the autopilot's state estimate is not ready",
     "ekf_unknown": "the autopilot has not said yet whether its state estimate is ready",
     "stale": "no fresh GPS",
+    "late": "fixes come long after what the accelerometer felt",
     "gps_gap": "a gap in GPS",
     "imu_stuck": "the accelerometer repeats one reading: see to it before the next flight",
     "refused": "fixes are far from what the accelerometer says",

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.boot_time import LONGEST_DELAY_S, began_anew
+from onboard.core.inputs.boot_time import FARTHEST_S, LONGEST_DELAY_S, began_anew, far_ahead
 from onboard.mavlink import limits
 from onboard.mavlink.dialect import MESSAGE_IDS, Message
 from onboard.mavlink.lateness import Lateness
@@ -47,8 +47,12 @@ class BootClock:
 
     One instance per autopilot, which :meth:`observe` has to be told every stamped message once, in
     the order of arrival; :meth:`seconds_ms` and :meth:`seconds_us` only convert, so that whoever
-    wants to know the time may ask the one clock that there is.  A reboot is confirmed by the
-    second stamp that lies in the past, so that one stray late packet is not taken for it.
+    wants to know the time may ask the one clock that there is.  A stamp that is far from those
+    before it, on either side, moves nothing before the next one agrees with it: one that is late,
+    or damaged, or repeated as it stands, is neither a reboot nor a leap of the clock.  A reboot is
+    told with its second stamp, and both of damage that chance lets pass must be in a row.  A boot
+    after the last stamp that was heard cannot be older than that is ago: stamps of older ones are
+    packets that were held back, or somebody else's, as long as the clock itself goes on.
 
     After a silence a clock that has begun anew may be ahead of all that was heard before.  But both
     clocks go at the same rate: one that has gone on for less than ours by more than a link can
@@ -68,6 +72,7 @@ class BootClock:
         self._silence: tuple[float, float, float, float] | None = None
         self._unix_offset: float | None = None
         self._paired = False
+        self._now: float | None = None
 
     def begin_anew(self) -> None:
         """It is another autopilot from here on."""
@@ -87,6 +92,11 @@ class BootClock:
             return False
         return now - self._heard[1] <= LONGEST_DELAY_S
 
+    def doubts(self, t: float) -> bool:
+        """Whether a stamp, s, is of no boot that was told: far from the newest, on either side."""
+        latest = self.latest
+        return latest is not None and (began_anew(t, latest) or far_ahead(t, latest))
+
     def observe(self, message: Message, now: float | None = None) -> bool:
         """Take note of the time that a message tells; whether that confirms a reboot.
 
@@ -96,7 +106,7 @@ class BootClock:
             message: of the autopilot.
             now: our own monotonic clock, s, where there is one: a recording has none.
         """
-        number, before = message.get_msgId(), self.reboots
+        number, before, self._now = message.get_msgId(), self.reboots, now
         stamp = None if now is None else self._stamp(message)
         if stamp is not None and now is not None and self._is_of_another(stamp, now):
             return False
@@ -111,7 +121,8 @@ class BootClock:
                 self.other.begin(*self._heard)
             self._heard = self._silence = None
         # Unix time runs on through a reboot, and is no boot time before both are known at once.
-        if now is not None and self.latest is not None and stamp is not None:
+        doubtful = self._suspect is not None
+        if now is not None and self.latest is not None and stamp is not None and not doubtful:
             self._keep_pace(self.latest, now)
             self.lateness.take(self.latest, now)
         return self.reboots != before
@@ -134,7 +145,7 @@ class BootClock:
         if self.other.take(stamp, now, beside=goes_on):
             # One that does not go on was none: what came late was taken for a reboot.
             return goes_on and (self.other.goes_on(now) or stamp > t)
-        if began_anew(stamp, t):
+        if began_anew(stamp, t) or far_ahead(stamp, t):
             self.other.begin(stamp, now)
         return False
 
@@ -173,8 +184,9 @@ class BootClock:
         """
         latest = -np.inf if self.latest is None else self.latest
         newest = np.maximum.accumulate(np.append(latest, stamps))
-        back = stamps < newest[:-1] - LONGEST_DELAY_S
-        return bool(newest[-1] < WRAP_S - limits.NEAR_WRAP_S and not back.any())
+        step = stamps - newest[:-1]
+        odd = (step < -LONGEST_DELAY_S) | ((step > FARTHEST_S) & (newest[:-1] > -np.inf))
+        return bool(newest[-1] < WRAP_S - limits.NEAR_WRAP_S and not odd.any())
 
     def advance(self, t: float) -> None:
         """Stamps of which :meth:`only_advances` holds have come, of which ``t`` is the largest."""
@@ -184,7 +196,7 @@ class BootClock:
 
     def seconds_ms(self, time_boot_ms: int) -> float:
         """Seconds since boot from a 32-bit ``time_boot_ms``; continues across the wrap."""
-        t, latest = time_boot_ms * 1e-3, self.latest
+        t, latest = time_boot_ms * 1e-3, self._suspect_ahead or self.latest
         if latest is None or latest < WRAP_S - limits.NEAR_WRAP_S:
             return t
         nearest = t + round((latest - t) / WRAP_S) * WRAP_S
@@ -210,25 +222,58 @@ class BootClock:
         t = self.seconds_us(time_usec)
         if time_usec < limits.UNIX_FROM_US:
             self._tick(t)
-        elif self.latest is None or t > self.latest:
+        elif self.latest is None or far_ahead(t, self.latest):
+            self._go_on(t)
+        else:
             # Unix time runs on through a reboot: it tells how late it is, not of reboots.
-            self.latest = t
+            self.latest = max(self.latest, t)
 
     def _pair(self, time_unix_usec: int, time_boot_ms: int) -> None:
         """SYSTEM_TIME: both clocks at one instant."""
         t = self.seconds_ms(time_boot_ms)
         self._tick(t)
-        if time_unix_usec > limits.UNIX_FROM_US:
+        if time_unix_usec > limits.UNIX_FROM_US and self._suspect is None:
             self._unix_offset = time_unix_usec * 1e-6 - t
             self._paired = True
 
     def _tick(self, t: float) -> None:
-        latest = self.latest
-        if latest is None or t >= latest:
-            self.latest = t
-            self._suspect = None
-        elif began_anew(t, latest):
-            if self._suspect is not None and abs(t - self._suspect) < LONGEST_DELAY_S:
-                self._begins_anew(t)
-            else:
+        latest, suspect = self.latest, self._suspect
+        if latest is None or not began_anew(t, latest):
+            self._go_on(t)
+        elif (
+            suspect is not None
+            and 0.0 < abs(t - suspect) < LONGEST_DELAY_S
+            and self._may_have_booted(t)
+        ):
+            self._begins_anew(t)
+        else:
+            self._suspect = t
+
+    def _may_have_booted(self, t: float) -> bool:
+        """Whether a boot of ``t`` s ago fits in the time since the last stamp was heard.
+
+        Where the clock has fallen silent it is not asked how fast another one goes (a simulator's).
+        """
+        if self._now is None or self._heard is None:
+            return True
+        silent = self._now - self._heard[1]
+        return silent > limits.FAILOVER_S or t <= silent + LONGEST_DELAY_S
+
+    def _go_on(self, t: float) -> None:
+        """A stamp that is not of another boot: where it leaps ahead, the next one has to as well.
+
+        That may be further on still: of a simulator in a hurry one comes every minute.
+        """
+        latest, ahead = self.latest, self._suspect_ahead
+        if latest is not None and far_ahead(t, latest):
+            agrees = ahead is not None and t != ahead and not began_anew(t, ahead)
+            if not agrees:
                 self._suspect = t
+                return
+        self.advance(t)
+
+    @property
+    def _suspect_ahead(self) -> float | None:
+        """A stamp ahead of all others that waits for the next one, s."""
+        latest, suspect = self.latest, self._suspect
+        return None if latest is None or suspect is None or suspect < latest else suspect

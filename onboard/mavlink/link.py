@@ -36,10 +36,11 @@ from onboard.mavlink.presence import Presence, Whose
 from onboard.mavlink.recorder import Recorder
 from onboard.mavlink.routes import Routes
 from onboard.mavlink.signing import Signing
-from onboard.mavlink.twins import Twins, our_heartbeat
+from onboard.mavlink.twins import Twins, our_heartbeat, our_tunnel, signature_of
 from onboard.outage import Over
 
 _HEARTBEAT = int(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+_TUNNEL = int(mavlink.MAVLINK_MSG_ID_TUNNEL)
 _STAMPED = frozenset(MESSAGE_IDS[name] for name in STAMPED)
 
 
@@ -93,7 +94,7 @@ class Link:
         """One that is put here later is run by who does that."""
         self._clock = clock
         self._wall_clock = wall_clock
-        self._audience = Audience((_HEARTBEAT, *_STAMPED))
+        self._audience = Audience((_HEARTBEAT, _TUNNEL, *_STAMPED))
         self._own: Source = (system or 1, COMPONENT)
         jitter = rng if rng is not None else random.Random()  # noqa: S311 - spreads reconnects, guards nothing
         self.connections = tuple(
@@ -328,9 +329,10 @@ class Link:
 
     def _heard_own_name(self, frame: Frame, now: float) -> None:
         """Somebody sends under our own ids: a router that gives us back, or a second service."""
-        if frame.message is None or frame.message_id != _HEARTBEAT or not self._counts(frame):
+        if frame.message is None or not self._counts(frame):
             return
-        event = self.twins.hear(int(frame.message.custom_mode), now)
+        signature = signature_of(frame.message)
+        event = None if signature is None else self.twins.hear(signature, now)
         if event is not None:
             self._audience.hear_of(now, event)
 
@@ -358,9 +360,9 @@ class Link:
             connection.pace(self._linger if brief else self._rest)
         if now >= self._next_beat:
             self._next_beat = now + limits.HEARTBEAT_INTERVAL_S
-            self.send(
-                our_heartbeat(self.twins.signature(now))
-            )  # over UDP it also tells the peer where we are
+            signature = self.twins.signature(now)
+            self.send(our_heartbeat(signature))  # over UDP it also tells the peer where we are
+            self.send(our_tunnel(signature))
         for connection in self.connections:
             connection.check(now)
         silent = self.presence.check(now)

@@ -4,6 +4,10 @@
 service has run (20 bits, s) and a number drawn at its start (12 bits), so that two services that
 hear each other agree on which of them was there first, and each knows its own from what a router
 gives back.
+
+An autopilot between two such services, each on a line of its own, passes on everything that is
+addressed to all but for HEARTBEATs, which never go where one of that name has come from.  So the
+same is said by a TUNNEL, too, the message for what is nobody else's business.
 """
 
 from __future__ import annotations
@@ -17,6 +21,9 @@ from onboard.mavlink.dialect import Message, mavlink
 
 NUMBER_BITS = 12
 LONGEST_S = (1 << (32 - NUMBER_BITS)) - 1
+PAYLOAD_TYPE = 47_191
+"""Of our TUNNEL; above 32767 nothing is registered."""
+PAYLOAD_LONGEST = 128
 TOGETHER_S = 3
 """Started within so many seconds of each other: then the larger number goes first."""
 
@@ -73,3 +80,20 @@ def our_heartbeat(signature: int) -> Message:
         mavlink.MAV_STATE_ACTIVE,
         3,
     )
+
+
+def our_tunnel(signature: int) -> Message:
+    """The same signature to everybody, in what an autopilot passes on."""
+    told = signature.to_bytes(4, "little")
+    payload = [*told, *bytes(PAYLOAD_LONGEST - len(told))]
+    return mavlink.MAVLink_tunnel_message(0, 0, PAYLOAD_TYPE, len(told), payload)
+
+
+def signature_of(message: Message) -> int | None:
+    """The signature that a message under our own ids carries; None if it has none."""
+    number = message.get_msgId()
+    if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+        return int(message.custom_mode)
+    if number == mavlink.MAVLINK_MSG_ID_TUNNEL and message.payload_type == PAYLOAD_TYPE:
+        return int.from_bytes(bytes(message.payload[:4]), "little")
+    return None

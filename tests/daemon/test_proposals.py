@@ -149,3 +149,31 @@ class TestAnotherAccelerometer:
     def test_that_flies_as_well_is_no_other_case(self):
         held = update(Proposals(PolicySettings(), approval=False), *self.both(), condition=FLYING)
         assert held == {1: {"armed"}, 2: {"armed"}}
+
+
+class TestWhatIsToldAtTheEndOfATransaction:
+    """Before the next look at it: nothing is about to be written then."""
+
+    @pytest.fixture
+    def proposals(self):
+        made = Proposals(PolicySettings(), approval=False)
+        assert update(made, calibration())[1] == set()
+        assert made.ready() is not None
+        return made
+
+    @pytest.mark.parametrize(
+        ("end", "name"),
+        [
+            (lambda p: p.failed(1, 0.0), "failed_before"),
+            (lambda p: p.succeeded(1, current(1).values()), "nothing_to_change"),
+            (lambda p: p.refuse(1, "a person rolled the last push back"), "refused"),
+        ],
+    )
+    def test_is_why_it_is_not_written_again(self, proposals, end, name):
+        end(proposals)
+        assert set(proposals.current[1].held_back) == {name}
+        assert proposals.ready() is None
+
+    def test_of_an_accelerometer_of_which_nothing_is_proposed_is_nothing(self, proposals):
+        proposals.failed(2, 0.0)
+        assert set(proposals.current) == {1}

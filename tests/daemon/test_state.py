@@ -15,6 +15,7 @@ from tests.daemon.daemons import calibration
 
 SENTENCES = {
     "armed": "armed, and the push policy is 'landed'",
+    "not_calibrated": "the calibration is 'collecting'",
     "disarmed_too_short": "disarmed for 1.2 s, 5 s needed",
     "approval": "a person has to approve",
     "not_diagnosed": "no flight was diagnosed yet: that is done after a landing",
@@ -56,6 +57,7 @@ def state(*held, approved=False, **circumstances):
     [
         ((), "calibrated", "about to be written"),
         (("armed",), "calibrated", "calibrated"),
+        (("armed", "not_calibrated", "not_sure"), "calibrated", "calibrated"),
         (("armed", "not_diagnosed"), "calibrated", "calibrated"),
         (("step_too_large",), "calibrated", "calibrated"),
         (("ekf_unhealthy", "step_too_large"), "calibrated", "calibrated"),

@@ -87,6 +87,54 @@ def test_one_stray_packet_is_not_a_reboot():
     assert clock.latest == pytest.approx(100.06)
 
 
+def told(clock, kind, ms, now=None):
+    message = {
+        "ATTITUDE": lambda: mavlink.MAVLink_attitude_message(ms, 0, 0, 0, 0, 0, 0),
+        "RAW_IMU": lambda: mavlink.MAVLink_raw_imu_message(1000 * ms, *range(9)),
+        "SYSTEM_TIME": lambda: mavlink.MAVLink_system_time_message(UNIX_US + 1000 * ms, ms),
+    }[kind]()
+    return clock.observe(message, now)
+
+
+@pytest.mark.parametrize("live", [True, False])
+@pytest.mark.parametrize("kind", ["ATTITUDE", "RAW_IMU", "SYSTEM_TIME"])
+@pytest.mark.parametrize("off", [3_600_000, 30_000, -20_000, -3_600_000])
+@pytest.mark.parametrize("times", [1, 3])
+def test_one_stray_stamp_is_no_reboot_however_often_it_is_repeated(kind, off, times, live):
+    clock = BootClock()
+    for k in range(500):
+        now = 10.0 + 0.02 * k if live else None
+        true = 5_000_000 + 20 * k
+        told(clock, "ATTITUDE", true, now)
+        for _ in range(times if k == 250 else 0):
+            told(clock, kind, true + off, now)
+            assert clock.latest == pytest.approx(true * 1e-3), "nothing is stamped by it"
+        assert clock.seconds_us(UNIX_US + 1000 * true) == pytest.approx(true * 1e-3, abs=0.03)
+    assert clock.reboots == 0
+    assert not live or (clock.certain(now) and not clock.other.goes_on(now))
+
+
+@pytest.mark.parametrize("leap", [12.0, 3600.0])
+@pytest.mark.parametrize("every_s", [0.02, 1.0, 15.0])
+def test_a_clock_that_has_gone_on_unheard_is_followed_from_its_second_stamp_on(leap, every_s):
+    clock = BootClock()
+    for k in range(100):
+        heard_ms(clock, 100_000 + 20 * k)
+    since = 102.0 + leap
+    for k in range(5):
+        heard_ms(clock, round(1e3 * (since + k * every_s)))
+        newest = since + k * every_s
+        assert clock.latest >= newest - (every_s if k else newest), "one stamp behind at most"
+    assert clock.reboots == 0
+
+
+def test_a_stray_stamp_before_a_reboot_hides_nothing_of_it():
+    clock = BootClock()
+    for ms in (600_000, 600_020, 4_000_000, 500, 520):
+        heard_ms(clock, ms)
+    assert (clock.reboots, clock.latest) == (1, 0.52)
+
+
 @given(st.permutations(range(0, 1000, 20)))
 def test_reordering_within_seconds_is_not_a_reboot(order):
     clock = BootClock()

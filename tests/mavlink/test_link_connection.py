@@ -43,8 +43,9 @@ class TestPace:
             transport.write = lambda data, to=(): (reads.append(transport.reads), write(data, to))
             transport.say(heartbeat())
             await asyncio.sleep(10.0)
-            assert len(reads) >= 9
-            assert all(after > before for before, after in pairwise(reads))
+            firsts = reads[::2]  # a HEARTBEAT and a TUNNEL at a time
+            assert len(firsts) >= 9
+            assert all(after > before for before, after in pairwise(firsts))
 
     @virtual_time
     async def test_answers_are_not_left_lying(self, air):

@@ -133,6 +133,34 @@ def test_what_was_taken_for_a_reboot_is_over_in_seconds(count):
     assert clock.reboots <= 1
 
 
+@pytest.mark.parametrize("count", [2, 40])
+@pytest.mark.parametrize("late", [4.0, 20.0, 600.0])
+def test_what_a_line_has_held_back_is_no_reboot_while_the_clock_goes_on(late, count):
+    """A boot of 20 s ago does not fit between two stamps that came in one second."""
+    line = Line().autopilot(1000.0, 0.0, 40.0)
+    clock = burst(line, 30.0, late, count).heard()
+    assert clock.reboots == 0
+    assert not clock.doubts(1040.0)
+    assert clock.doubts(1040.0 - late)
+
+
+@pytest.mark.parametrize("rate", [1.0, 20.0])
+@pytest.mark.parametrize("silence", [0.05, 1.0, 5.0])
+def test_a_reboot_is_told_in_seconds_and_nothing_of_it_is_mixed_with_before(silence, rate):
+    booted = 30.0 + silence
+    line = Line().autopilot(50_000.0, 0.0, 30.0, rate=rate)
+    line.autopilot(0.5, booted, 60.0, rate=rate)
+    clock, told = BootClock(), None
+    for now, stamp in sorted(line.packets):
+        before = clock.reboots
+        ms = mavlink.MAVLink_attitude_message(int(1e3 * stamp), 0, 0, 0, 0, 0, 0)
+        clock.observe(ms, now)
+        told = now if clock.reboots > before else told
+        assert clock.doubts(stamp) == (stamp < 49_000.0 and told is None)
+    assert clock.reboots == 1
+    assert told < max(booted + 0.2, 30.0 + 1.7)
+
+
 def test_one_of_two_that_goes_leaves_the_other():
     for first, second in ((900.0, 100.0), (100.0, 900.0)):
         line = Line().autopilot(first, 0.0, 40.0).autopilot(second, 10.0, 80.0)

@@ -23,10 +23,15 @@ def known_thread(monkeypatch):
     known(monkeypatch)
 
 
+@pytest.fixture(params=["copter", "plane"])
+def vehicle(request):
+    return request.param
+
+
 @pytest.fixture
-def kind(request):
+def kind(request, vehicle):
     chosen = request.config.getoption("--sitl")
-    reason = harness.unavailable(chosen, "copter")
+    reason = harness.unavailable(chosen, vehicle)
     if reason:
         pytest.skip(reason)
     return chosen
@@ -50,9 +55,9 @@ def told(service, kind):
 
 
 @pytest.mark.slow
-async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, document, monkeypatch):
+async def test_what_was_pushed_is_right_and_survives_a_reboot(kind, vehicle, document):
     speedup = 15 if kind == "builtin" else 6
-    async with harness.simulator(kind, "copter", speedup=speedup) as sitl:
+    async with harness.simulator(kind, vehicle, speedup=speedup) as sitl:
         await sitl.set_truth(1, scale=SCALE, offset=OFFSET)
         document["link"] = {"endpoints": [sitl.endpoint]}
         async with running(document) as service:

@@ -28,7 +28,7 @@ from onboard.core.gps.trust import TrustWindow
 from onboard.core.inputs.airborne import Ground
 from onboard.core.inputs.assembly import Assembly
 from onboard.core.inputs.blocks import Block
-from onboard.core.inputs.boot_time import began_anew
+from onboard.core.inputs.boot_time import began_anew, far_ahead
 from onboard.core.inputs.parameters import ParametersInForce
 from onboard.core.inputs.range_checks import impossible, measured
 from onboard.core.inputs.samples import (
@@ -123,7 +123,7 @@ class Calibrator:
     def feed(self, sample: Sample) -> tuple[Event, ...]:
         """Take one sample, in order of arrival.  Never raises on data: it counts."""
         sample = measured(sample)
-        refusal = impossible(sample)
+        refusal = impossible(sample) or self._clock.refuses(sample)
         if refusal is not None:
             if not isinstance(sample, ParameterValue):  # unset ones are NaN: nothing is lost
                 self._counts[refusal] += 1
@@ -132,7 +132,7 @@ class Calibrator:
             case ImuSample():
                 return self._imu(sample)
             case AttitudeSample():
-                self._attitude(sample)
+                self._assembly.streams.attitude(sample)
             case ParameterValue():
                 self._parameter(sample)
             case GpsFix():
@@ -165,6 +165,7 @@ class Calibrator:
             newest > -math.inf
             and block.is_plain
             and not began_anew(block.first_imu, newest)
+            and not far_ahead(block.leads, newest)
             and block.attitude_ahead(newest) <= AHEAD_OF_IMU_S
             and self._assembly.streams.continued_by(block)
             and not (block.coarse and self._may_forget(block))
@@ -330,12 +331,6 @@ class Calibrator:
         self._assembly.streams.imu(sample, self.parameters)
         return events + self._passed(sample.t)
 
-    def _attitude(self, sample: AttitudeSample) -> None:
-        if self._clock.is_ahead(sample.t):
-            self._counts["attitude_ahead"] += 1
-        else:
-            self._assembly.streams.attitude(sample)
-
     def _judged(self, sample: Sample) -> tuple[Event, ...]:
         """What the trust window says; outages are counted: there is no fix to be refused."""
         return self._counted(self._trust.feed(sample))
@@ -350,6 +345,9 @@ class Calibrator:
         if self._clock.is_other(fix.t):
             # A reboot shows in the inertial samples first.
             self._counts["gps_other_clock"] += 1
+            return self._judged(fix) if fix.t < self._clock.newest else ()
+        if self._clock.is_ahead(fix.t):
+            self._counts["gps_ahead"] += 1
             return ()
         before = self._trust.receiver
         events = self._judged(fix)
@@ -361,9 +359,6 @@ class Calibrator:
             self._counts["another_receiver"] += 1
             for imu in self._engines.known:
                 self.begin_anew(imu)
-        if self._clock.is_ahead(fix.t):
-            self._counts["gps_ahead"] += 1
-            return events
         if self._trust.repeats:
             self._counts["gps_held"] += 1
             return events

@@ -20,6 +20,7 @@ class Distrust(StrEnum):
     EKF_GPS_GLITCH = "ekf_gps_glitch"
     EKF_UNHEALTHY = "ekf_unhealthy"
     STALE = "stale"
+    LATE = "late"
     GPS_GAP = "gps_gap"
     RESTARTED = "restarted"
     CONFIGURED_END = "configured_end"

@@ -27,6 +27,7 @@ RECOVERY: Final[Mapping[Distrust, float]] = MappingProxyType(
         Distrust.EKF_GPS_GLITCH: 5.0,
         Distrust.EKF_UNHEALTHY: 5.0,  # attitude needs seconds of aiding to become right again
         Distrust.STALE: 3.0,
+        Distrust.LATE: 3.0,  # a link that has held fixes back does so again
         Distrust.GPS_GAP: 0.0,  # a lost packet says nothing about the receiver
         Distrust.RESTARTED: 0.0,
     }
@@ -40,6 +41,10 @@ MOST_REFUSED_SPANS: Final = 512
 GIVEN_UP_S: Final = 60.0
 """Another receiver's fixes, while there is none of the first, s: longer than a cold start differs
 [data sheet]."""
+LATE_SHARE: Final = 0.5
+"""Share of the longest gap by which a fix may be behind the inertial samples when it comes: of a
+gap that shows, most is then that, and no fix was missed [physics].  Once fixes are late, so much
+less late they are in time again."""
 STUCK_SHARE: Final = 0.5
 """Share of the longest gap for which repeats of an old fix must have come on: then the receiver has
 stopped, not the link [cost]."""

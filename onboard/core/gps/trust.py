@@ -28,7 +28,7 @@ from onboard.core.gps.distrust import (
 )
 from onboard.core.gps.held import HeldReasons
 from onboard.core.gps.ledger import FixLedger
-from onboard.core.gps.limits import LATE_IN_A_ROW, STUCK_SHARE, TrustLimits
+from onboard.core.gps.limits import LATE_IN_A_ROW, LATE_SHARE, STUCK_SHARE, TrustLimits
 from onboard.core.gps.plausibility import Contradiction, FixPlausibility
 from onboard.core.gps.receiver_choice import ReceiverChoice
 from onboard.core.inputs.boot_time import began_anew
@@ -88,6 +88,8 @@ class TrustWindow:
         self._last_fix: float | None = None
         self._last_heard = -math.inf  # any message of the receiver, repeats too
         self._now = -math.inf
+        self._felt_at = -math.inf  # of the inertial samples, which no fix of their time precedes
+        self._late_s = 0.0  # by which the latest fix was behind them when it came
         self._first_opened: float | None = None
         self._late = 0
         self._repeats = False
@@ -168,6 +170,7 @@ class TrustWindow:
             self._phase, self._reason = Phase.WAITING, Distrust.RESTARTED
         self._forget_fixes()
         self._last_heard, self._now = -math.inf, -math.inf
+        self._felt_at = -math.inf
         # A configured duration counts trusted time of one flight; a new boot is a new flight.
         self._first_opened = None
         return events
@@ -183,15 +186,25 @@ class TrustWindow:
         )
 
     def pass_time(self, t: float) -> tuple[WindowEvent, ...]:
-        """Time (s, finite) has passed: without a fix for too long, the window closes."""
+        """An inertial sample of this time (s, finite) has come.
+
+        Without a fix for too long, the window closes.
+        """
+        self._felt_at = max(self._felt_at, t)
+        return self._pass(t)
+
+    def _pass(self, t: float) -> tuple[WindowEvent, ...]:
         self._now = max(self._now, t)
         if self._phase is not Phase.OPEN or self._last_fix is None:
             return ()
         if t - self._last_fix <= self._limits.gap:
             return ()
         # Repeats of an old fix come on: it is the receiver that stopped, not the link.
-        stuck = self._last_heard - self._last_fix > STUCK_SHARE * self._limits.gap
-        reason = Distrust.STALE if stuck else Distrust.GPS_GAP
+        reason = Distrust.GPS_GAP
+        if self._last_heard - self._last_fix - self._late_s > STUCK_SHARE * self._limits.gap:
+            reason = Distrust.STALE
+        elif self._late_s > LATE_SHARE * self._limits.gap:
+            reason = Distrust.LATE
         self._held.report(reason, t, bad=True)
         self._plausibility.reset()
         return self._close(self._last_fix, reason)
@@ -212,10 +225,11 @@ class TrustWindow:
         if last is not None and fix.t < last:
             return self._late_fix(fix.t, last)
         self._late = 0
+        self._late_s = max(0.0, self._felt_at - fix.t)
         has_fix = fix.fix_type >= self._limits.fix_type
         self._repeats = has_fix and self._plausibility.repeats(fix)
         if self._repeats:
-            return self.pass_time(fix.t)
+            return self._pass(fix.t)
         events: tuple[WindowEvent, ...] = ()
         if last is not None and fix.t - last > self._limits.gap:
             self._held.report(Distrust.GPS_GAP, fix.t, bad=True)
@@ -223,6 +237,9 @@ class TrustWindow:
             events = self._close(last, Distrust.GPS_GAP)
         self._last_fix = fix.t
         self._held.report(Distrust.GPS_GAP, fix.t, bad=False)
+        if not self.is_open:  # else the next inertial sample says so
+            share = LATE_SHARE if Distrust.LATE in self._held.gravest_first else 1.0
+            self._held.report(Distrust.LATE, fix.t, bad=self._late_s > share * self._limits.gap)
         for reason, bad in self._judge(fix).items():
             self._held.report(reason, fix.t, bad=bad)
         events += self._settle(fix.t, last)
@@ -236,13 +253,15 @@ class TrustWindow:
         """A fix older than the one before; many in a row say that *that* one was far ahead.
 
         Only those that are later than a link can make them: one that repeats and reorders brings
-        any number of fixes after a newer one.
+        any number of fixes after a newer one.  And not where the one before has just come in time:
+        they are a line's that has held them back.
         """
         self._ledger.count(Distrust.STALE)
         if not began_anew(t, last):
             return ()
         self._late += 1
-        if self._late < LATE_IN_A_ROW:
+        in_time = 0.0 <= self._felt_at - last <= self._limits.gap
+        if self._late < LATE_IN_A_ROW or in_time:
             return ()
         events = self._close(last, Distrust.STALE)
         self._plausibility.reset()

@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from onboard.core.inputs.boot_time import LONGEST_DELAY_S
+from onboard.core.inputs.boot_time import FARTHEST_S, LONGEST_DELAY_S
 from onboard.core.inputs.limits import HIGHRES_S
 from onboard.core.inputs.range_checks import attitudes_possible, imu_possible
 from onboard.core.inputs.samples import (
@@ -150,13 +150,13 @@ class Block:
     def is_plain(self) -> bool:
         """Whether nothing is to be refused, or to begin a boot, for what is in the block itself."""
         numbers = {columns.imu for columns in self.kept}
-        back = self._imu_t < self._newest(-math.inf)[:-1] - LONGEST_DELAY_S
+        step = self._imu_t[1:] - self._newest(-math.inf)[1:-1]
         return (
             len(numbers) == len(self.kept)  # two sources of one accelerometer refuse each other's
             and all(columns.is_plain for columns in self.imus)
             and all(_covers(fine, raw) for raw, fine in self.coarse)
             and self.attitude.is_plain
-            and not back.any()
+            and not np.any((step < -LONGEST_DELAY_S) | (step > FARTHEST_S))
         )
 
     @property
@@ -173,6 +173,11 @@ class Block:
     def first_imu(self) -> float:
         """The least time of an inertial sample, if the block is plain, s; inf if there is none."""
         return min((columns.t.item(0) for columns in self.imus), default=math.inf)
+
+    @property
+    def leads(self) -> float:
+        """Time of the inertial sample that came first, s; -inf if there is none."""
+        return self._imu_t.item(0) if len(self._imu_t) else -math.inf
 
     @property
     def latest(self) -> float:

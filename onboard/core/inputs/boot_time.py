@@ -26,6 +26,16 @@ NEXT_S = 1.0
 """s; within which the next inertial sample of a boot comes [physics: a log has ten a second]."""
 
 
+def far_ahead(t: float, newest: float) -> bool:
+    """Whether a stamp is so far ahead that another one has to agree before it moves a clock.
+
+    Args:
+        t: the stamp, s since boot.
+        newest: the largest one before it, s; minus infinity if there was none: any may be first.
+    """
+    return -math.inf < newest < t - FARTHEST_S
+
+
 class Boots:
     """Tells where a recording's inertial samples are of another boot.
 

@@ -15,7 +15,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import ParamSpec, Protocol, TypeVar
 
-from onboard.core.inputs.samples import ParameterValue, Sample
+from onboard.core.inputs.samples import (
+    AttitudeSample,
+    ImuSample,
+    ParameterValue,
+    Sample,
+    Vibration,
+)
 from onboard.daemon.learning import limits
 from onboard.daemon.learning.failures import Failures, LearnerError
 from onboard.daemon.learning.identity import Identity
@@ -29,6 +35,9 @@ from onboard.mavlink.dialect import Message
 from onboard.mavlink.limits import PARAMETERS_MAX
 from onboard.mavlink.repetitions import Repetitions
 from onboard.outage import Outage
+
+STAMPED = (ImuSample, AttitudeSample, Vibration)
+"""Samples of messages that tell the boot time, and move the clock if it is believed."""
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -155,8 +164,14 @@ class Handover:
         )
 
     def _plausible(self, samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
-        """Without parameters beyond what any firmware has: everything that is told is kept."""
+        """Without parameters beyond what any firmware has: everything that is told is kept.
+
+        And without what is stamped by no boot that the link has told.
+        """
         for sample in samples:
+            if isinstance(sample, STAMPED) and self.decoder.clock.doubts(sample.t):
+                self.counters["samples_of_no_boot"] += 1
+                return ()
             if type(sample) is ParameterValue and sample.name not in self._told:
                 if len(self._told) >= PARAMETERS_MAX and sample.name not in self._needed:
                     self.counters["parameters_ignored"] += 1

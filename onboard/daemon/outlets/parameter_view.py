@@ -77,6 +77,7 @@ REASONS: Final[Mapping[str, int]] = MappingProxyType(
         "configured_end": 13,
         "end_of_data": 14,
         "ekf_unknown": 15,
+        "late": 16,
     }
 )
 

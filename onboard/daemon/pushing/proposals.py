@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from onboard.core.estimate.result import Calibration, Status
@@ -277,6 +277,7 @@ class Proposals:
             standing.refused = why
             if self._refusals is not None:
                 self._refusals.refused(imu, why)
+        self._hold(imu, "refused", why)
 
     def succeeded(self, imu: int, values: Sequence[float]) -> None:
         """A transaction completed: its approval is used up; ``values`` are the six now."""
@@ -284,6 +285,7 @@ class Proposals:
         standing.approved = None
         standing.failures = 0
         standing.written = tuple(values)
+        self._hold(imu, "nothing_to_change", "the autopilot has these values")
 
     def failed(self, imu: int, now: float, *, changed_by_other: bool = False) -> None:
         """A transaction did not complete: wait, the longer the oftener.
@@ -298,6 +300,13 @@ class Proposals:
         ]
         standing.failures += 1
         standing.not_before = now + wait
+        self._hold(imu, "failed_before", f"the last try failed: the next one in {wait:.0f} s")
+
+    def _hold(self, imu: int, name: str, why: str) -> None:
+        """What is told of a proposal says so at once, and not with the next look at it."""
+        if imu in self.current:
+            held_back = {**self.current[imu].held_back, name: why}
+            self.current[imu] = replace(self.current[imu], held_back=held_back)
 
     def standing(self, imu: int) -> Standing:
         """What is remembered of one accelerometer."""

@@ -144,7 +144,8 @@ def _calibrated(c: Calibration, now: Circumstances) -> StateView:
     further = c.coverage.advice if now.flying else ""
     if now.proposal is None and now.impossible and not now.flying:
         return _state("held_back", "held back", f"{known}; not written: {now.impossible}", WARNING)
-    if now.proposal is None:
+    # Of an answer that has just become one the proposal may be a moment behind.
+    if now.proposal is None or "not_calibrated" in now.proposal.held_back:
         return _state("calibrated", calibrated(c), known, GOOD, further)
     held = now.proposal.held_back
     if now.proposal.rejected:

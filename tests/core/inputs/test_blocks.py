@@ -279,7 +279,7 @@ def test_a_receiver_that_never_had_a_fix_is_given_up():
 def test_a_gap_is_seen_by_what_comes_after_the_fix():
     """An older inertial sample behind a late fix says less than the newest one before it."""
     newest = FLIGHT[-1].t + 2.51
-    late = fix(newest - 2.505)
+    late = fix(newest - 2.495)  # by a whole gap it would open no window
     first, second = (next(s for s in FLIGHT if getattr(s, "imu", 0) == imu) for imu in (1, 2))
     ending = [replace(first, t=newest), late, replace(second, t=newest - 0.02)]
     size = len(FLIGHT) // 4 + 3
