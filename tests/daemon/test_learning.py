@@ -3,6 +3,7 @@
 import errno
 import itertools
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -80,6 +81,33 @@ async def test_a_learner_that_lags_says_so_and_catches_up(document, daemon, port
         times = [s.t for s in learned if isinstance(s, ImuSample)]
         assert len(times) > 3
         assert max(b - a for a, b in itertools.pairwise(times)) < 0.1, "nothing was left out"
+
+
+async def test_what_waits_for_a_diagnosis_is_no_lag(document, daemon, port, monkeypatch):
+    release = threading.Event()
+    monkeypatch.setattr("onboard.daemon.learning.limits.BEHIND_S", 0.3)
+    monkeypatch.setattr("onboard.daemon.learning.limits.CAUGHT_UP_S", 0.29)
+    async with daemon(document) as service, Vehicle(port):
+        handover = service.handover
+        await until(lambda: handover._begun)
+        learner = handover._learner
+        learn = learner.learn
+
+        def landed(samples, **how):
+            learner.learn = learn
+            return replace(learn(samples, **how), diagnosing=(1,))
+
+        def slow():
+            release.wait(30.0)
+            return replace(handover.learned, diagnosing=())
+
+        learner.learn, learner.examine = landed, slow
+        await until(lambda: handover.learned.diagnosing and handover.behind(service._clock()) > 0.6)
+        await service.on_tick(service._clock())
+        release.set()
+        await until(lambda: not handover.learned.diagnosing)
+        handover.tell_of_lag(service._clock())
+        assert "fell_behind" not in service.snapshot().counters
 
 
 async def test_reset_forgets_on_disk_too(document, daemon, port, tmp_path):

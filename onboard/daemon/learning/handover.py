@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import ParamSpec, Protocol, TypeVar
@@ -121,6 +122,7 @@ class Handover:
         self._disk = Outage(settle_s=0.0)
         self._worker: Worker | None = None
         self._busy_since: float | None = None
+        self._examined = -math.inf
         self._closing = False
         self._listeners: list[Callable[[Learned], None]] = []
 
@@ -236,6 +238,7 @@ class Handover:
         if self.learned is not None and self.learned.diagnosing and not self._closing:
             self._busy_since = self._clock()
             self._accept(await self._call(self._learner.examine))
+            self._examined = self._clock()
             self._next_save = now  # the flight cannot be diagnosed again after a power cut
         if now >= self._next_save:
             self._next_save = now + self._save_every_s
@@ -318,11 +321,16 @@ class Handover:
         return 0.0 if oldest is None else max(0.0, now - oldest)
 
     def tell_of_lag(self, now: float) -> None:
-        """Say when the learner falls behind what comes in, and when it has caught up."""
+        """Say when the learner falls behind what comes in, and when it has caught up.
+
+        While a flight is judged, all else waits: that is told by itself.
+        """
         lag = self.behind(now)
         if not self._begun:
             return
-        if not self._behind and lag > limits.BEHIND_S:
+        judging = self.learned is not None and bool(self.learned.diagnosing)
+        by_itself = 0.0 if judging else min(lag, now - self._examined)
+        if not self._behind and by_itself > limits.BEHIND_S:
             self._behind = True
             self.counters["fell_behind"] += 1
             text = f"the learner is {lag:.0f} s behind what comes in: answers come late"

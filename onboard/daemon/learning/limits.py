@@ -19,7 +19,8 @@ PARAMETERS_S: Final = 30.0
 """s; so long is waited for the parameters that say what the messages mean, while what comes is kept
 [tuned: they take a few seconds to read]."""
 BEHIND_S: Final = 15.0
-"""s; a diagnosis makes what comes in wait for some seconds, more than this is told [tuned]."""
+"""s; more than this is told, of what no diagnosis has made wait [use: nobody waits so long for a
+page without asking]."""
 CAUGHT_UP_S: Final = 2.0
 """s; closer than this the learner has caught up again [tuned]."""
 STEP_LIMIT_S: Final = 120.0
