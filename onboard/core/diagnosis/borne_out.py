@@ -16,6 +16,7 @@ over what the sums call information (Huber 1967; Godambe 1960).
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Final
 
@@ -27,6 +28,8 @@ from onboard.core.estimate.solution import Solution
 from onboard.core.inputs.limits import DELAY_RANGE_S
 
 DELAY: Final = "gps_delay"
+TOLD: Final = math.sqrt(0.5) / OFF_SIGMAS
+"""How well a share is told by both delays, each of whose answers errs by a sigma."""
 
 
 def doubted(made: Examination) -> Solution:
@@ -42,18 +45,25 @@ def doubted(made: Examination) -> Solution:
 def share_borne_out(made: Examination) -> float:
     """By what share of the way delays that are off come back, 0 to 1.
 
-    What is known of the delay before the flight is borne out: it is no regressor's.
+    One that is later or earlier, whichever there is more room for, where it comes back as far as
+    can be told; else both, in the mean of which what bends is not.  What is known of the delay
+    before the flight is borne out: it is no regressor's.
 
     Raises:
         KeyError: no flight was processed.
     """
-    i = made.model.index[DELAY]
-    variance = float(made.found().covariance[i, i])
-    off = OFF_SIGMAS * np.sqrt(variance)
-    low, high = np.clip((made.point.delay - off, made.point.delay + off), *DELAY_RANGE_S)
-    back = (_asked(made, float(low)) - _asked(made, float(high))) / float(high - low)
+    found, i = made.found(), made.model.index[DELAY]
+    variance = float(found.covariance[i, i])
     known = variance / float(made.model.prior_sigma[i]) ** 2
-    return float(np.clip(back + known, 0.0, 1.0))
+    off = OFF_SIGMAS * math.sqrt(variance)
+    here, (least, most) = made.point.delay, DELAY_RANGE_S
+    ends = [max(here - off, least), min(here + off, most)]
+    first, second = sorted(ends, key=lambda end: -abs(end - here))
+    asked = _asked(made, first)
+    share = known + (float(found.theta[i]) - asked) / (first - here)
+    if share < 1.0 - TOLD and second != here:
+        share = known + (_asked(made, second) - asked) / (first - second)
+    return min(max(share, 0.0), 1.0)
 
 
 def _asked(made: Examination, delay: float) -> float:

@@ -104,5 +104,5 @@ receiver's phase centre moves by as much with the satellites that it sees [data 
 # What of the receiver's delay is borne out (borne_out).
 
 OFF_SIGMAS: Final = 5.0
-"""Sigmas to either side of its estimate at which a delay is asked for once more: two steps that err
-by a sigma each, and apart, tell the share that comes back to a seventh [probability]."""
+"""Sigmas to either side of its estimate at which a delay is asked for once more: two answers that
+err by a sigma each, and apart, tell the share that comes back to a seventh [probability]."""
