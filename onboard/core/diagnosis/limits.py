@@ -100,3 +100,9 @@ moment one is beyond it by chance once in twenty times [probability]."""
 ANTENNA_FLOOR_M: Final = 0.01
 """m; sigma of the antenna's place in each of several recordings beside what their sums say: a
 receiver's phase centre moves by as much with the satellites that it sees [data sheet]."""
+
+# What of the receiver's delay is borne out (borne_out).
+
+OFF_SIGMAS: Final = 5.0
+"""Sigmas to either side of its estimate at which a delay is asked for once more: two answers that
+err by a sigma each, and apart, tell the share that comes back to a seventh [probability]."""

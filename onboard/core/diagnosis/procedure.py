@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from math import inf, log
 
 from onboard.core.diagnosis.about_jumps import about_jumps
+from onboard.core.diagnosis.borne_out import doubted
 from onboard.core.diagnosis.cleared import Cleared, cleared, since_reboot, unused_of
 from onboard.core.diagnosis.companions import Companion, Companions
 from onboard.core.diagnosis.effort import FURTHEST, SEARCHED
@@ -98,13 +99,15 @@ def examine(
     # with manoeuvres.
     if clear.fault is None and not clear.clipped:
         stands = _beside_wander(clear, stands, asked, origin, calibrator)
+    about = about_jumps(stands.full, stands.choice, stands.final, stands.families)
+    stands.final.claim(doubted(stands.final))
     return Judge(
         calibrator,
         imu,
         Evidence(
             full=stands.full,
             choice=stands.choice,
-            about=about_jumps(stands.full, stands.choice, stands.final, stands.families),
+            about=about,
             final=stands.final,
             families=tuple(stands.families),
             doubts=stands.rivals,
