@@ -14,9 +14,8 @@ from onboard.answers.flown_order import in_order
 from onboard.answers.one_flight import no_answer
 from onboard.answers.recorded import Recorded, unanswered
 from onboard.answers.replay import Reading, read
-from onboard.answers.together import takes_part
+from onboard.answers.together import named, takes_part
 from onboard.core.diagnosis.records import Diagnosis
-from onboard.core.physics.wording import listed
 from onboard.recordings.recording import Recording
 
 
@@ -112,8 +111,7 @@ def explain(
 def _beside(given: Answer, others: Sequence[int]) -> Iterator[str]:
     """That others felt the flight, too, where that would count."""
     if others and takes_part(given):
-        who = f"accelerometer{'s' if len(others) > 1 else ''} {listed([str(n) for n in others])}"
         yield (
-            f"{who} felt the same flight, and this is by accelerometer {given.imu} alone: what to "
-            "set by all of them, onboard replay says"
+            f"{named(others)} felt the same flight, and this is by {named([given.imu])} alone: "
+            "what to set by all of them, onboard replay says"
         )

@@ -63,10 +63,14 @@ def judged(c: Calibration, needs: Needs) -> Calibration:
     done = good_enough(c, needs)
     if c.together is None or done is (c.status is Status.CALIBRATED):
         return c
-    others = [str(imu) for imu in c.together.imus if imu != c.imu]
-    who = f"accelerometer{'s' if len(others) > 1 else ''} {listed(others)}"
+    who = named([imu for imu in c.together.imus if imu != c.imu])
     if not done:
         note = f"beside what {who} knew, what this one asks for is not sure to be better"
         return replace(c, status=Status.INSUFFICIENT, note=f"{note}. {c.note}".rstrip())
     note = f"by itself it is not sure enough, with what {who} felt in the same flight it is"
     return replace(c, status=Status.CALIBRATED, note=f"{note}. {c.note}".rstrip())
+
+
+def named(imus: Sequence[int]) -> str:
+    """``accelerometer 2``; ``accelerometers 2 and 3``."""
+    return f"accelerometer{'s' if len(imus) > 1 else ''} {listed([str(n) for n in imus])}"
