@@ -22,8 +22,9 @@ from onboard.mavlink.dialect import Message, mavlink
 NUMBER_BITS = 12
 LONGEST_S = (1 << (32 - NUMBER_BITS)) - 1
 PAYLOAD_TYPE = 47_191
-"""Of our TUNNEL; above 32767 nothing is registered."""
+"""Of our TUNNEL; above 32767 nothing is registered [data sheet: MAV_TUNNEL_PAYLOAD_TYPE]."""
 PAYLOAD_LONGEST = 128
+"""Bytes that a TUNNEL has room for [data sheet: common.xml]."""
 TOGETHER_S = 3
 """Started within so many seconds of each other: then the larger number goes first."""
 

@@ -94,9 +94,8 @@ def examine(
     stands = _modelled(clear.full, asked, origin, calibrator, named_only=clear.clipped)
     if not clear.clipped:
         clear, stands = _with_given_up(clear, stands, asked, origin, calibrator)
-    # An EKF that followed false fixes has tilted, and comes back as slowly as an offset wanders.
-    # What shakes near the limit of its sensor is cut now and then, unseen, which comes and goes
-    # with manoeuvres.
+    # An EKF that followed false fixes comes back as slowly as an offset wanders.  What shakes near
+    # the limit of its sensor is cut now and then, unseen, as manoeuvres come and go.
     if clear.fault is None and not clear.clipped:
         stands = _beside_wander(clear, stands, asked, origin, calibrator)
     about = about_jumps(stands.full, stands.choice, stands.final, stands.families)
